@@ -216,7 +216,7 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
     yield StudioStep("Review", "/review", "ready" if runs else "empty", runs[0].name if runs else "no run yet")
     files = sorted(path.name for path in project.folder.glob("digitised_*_*.csv"))
     state: StepState = "ready" if files else "empty"
-    yield StudioStep("Digitise", "/digitise", state, files[-1] if files else "points by hand, to compare with")
+    yield StudioStep("Digitise", "/digitise", state, files[-1] if files else "points by hand, to compare")
     finished = [run for run in runs if (run / SUMMARY).is_file()]
     reports = [run for run in finished if (run / REPORT).is_file()]
     yield StudioStep(

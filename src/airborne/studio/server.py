@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import math
 import secrets
 import socket
 import webbrowser
@@ -12,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 
-from nicegui import app, ui
+from nicegui import app, binding, ui
 from nicegui.server import Server
 
 from airborne.errors import AirborneError
@@ -73,6 +74,7 @@ def serve(path: Path, *, port: int, browser: bool, is_guided: bool) -> None:
         if browser:
             webbrowser.open(address)
 
+    binding.MAX_PROPAGATION_TIME = math.inf  # [s]; beyond it NiceGUI writes a line for developers to the terminal
     app.on_startup(announce)
     app.on_shutdown(lambda: [command.stop() for command in session.commands.values()])
     ui.run(

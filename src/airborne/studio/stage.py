@@ -61,17 +61,19 @@ def draw_rays(scene: Scene, camera: Camera, points: Array, colour: str) -> None:
 
 
 def draw_body(model: BodyModel, address: str) -> None:
-    """Show a body in its zero pose on the floor; `address` gives the mesh of each part, with {part} in it."""
+    """Show a body in its zero pose, without a floor; `address` gives the mesh of each part, with {part} in it."""
     pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.zeros((model.n_joints, 3)))
     corners = bounding_points(model.with_pose(pose), cached_surface_arrays(model))
     lift = np.array([0.0, 0.0, -corners[:, 2].min()])
     pose, (middle, away_m) = pose.move(lift, np.zeros(3)), overview(corners + lift)
-    BodyOnStage(_scene(middle, away_m), model, address).show(pose)
+    BodyOnStage(_scene(middle, away_m, has_floor=False), model, address).show(pose)
 
 
-def _scene(middle: Array, away_m: float) -> Scene:
+def _scene(middle: Array, away_m: float, *, has_floor: bool = True) -> Scene:
     """Build an empty scene that is seen from `away_m` beside its middle (3,) [m]."""
-    scene = ui.scene(grid=(60, 60), background_color="#f6f7f8").style("width: 100%; flex: 1; min-height: 180px")
+    scene = ui.scene(grid=(60, 60) if has_floor else False, background_color="#f6f7f8").style(
+        "width: 100%; flex: 1; min-height: 180px"
+    )
     with scene:
         Redraw(scene.id)
     (x, y, z), (u, v, w) = (map(float, each) for each in (middle + away_m * FROM, middle))

@@ -1,5 +1,6 @@
 // How a view is drawn: pictures, what lies over them, marks, the loupe. Methods of the component in `view.js`.
 const LOUPE = 8; // times as large as the video
+const RIM = "rgba(0,0,0,0.6)"; // about what is drawn, or a yellow line on a yellow body would not be seen
 
 export default {
   draw() {
@@ -59,13 +60,14 @@ export default {
   drawItem(pen, place, item) {
     this.trace(pen, place, item);
     if (item.fill) { pen.fillStyle = item.fill; pen.fill(); }
-    if (item.colour) { pen.strokeStyle = item.colour; pen.lineWidth = item.width || 1.5; pen.stroke(); }
+    const width = item.width || 1.5, strokes = item.colour ? [[RIM, width + 2], [item.colour, width]] : [];
+    for (const [colour, wide] of strokes) { pen.strokeStyle = colour; pen.lineWidth = wide; pen.stroke(); }
     if (item.text) this.write(pen, item.text, ...this.toScreen(place, ...item.points[0]), item.colour);
   },
   drawMark(pen, place, mark) {
     const [u, v] = this.dragged && this.dragged.id === mark.id ? [this.dragged.u, this.dragged.v] : [mark.u, mark.v];
     const [x, y] = this.toScreen(place, u, v), chosen = mark.id === this.selected, r = chosen ? 9 : 6;
-    for (const [colour, width] of [["rgba(0,0,0,0.6)", 3.5], [mark.colour, 1.5]]) {
+    for (const [colour, width] of [[RIM, 3.5], [mark.colour, 1.5]]) {
       pen.strokeStyle = colour;
       pen.lineWidth = width;
       pen.beginPath();

@@ -25,12 +25,12 @@ async def body_page(session: Session) -> None:
     """Let the user choose a body file, or say how tall and heavy the person is."""
     text = (
         "A thing needs a body file with its measured solids and colours. "
-        "A person is made of stature and mass; the colours are taken from the video."
+        "A person's body is scaled from stature and mass, and its colours are taken from the video."
     )
     async with page_frame(session, "Body", "What is tracked?", text, scrolls=True) as changed:
         table = session.project().table("body")
         bodies = await in_thread(list_bodies, session.folder)
-        with ui.element("div").classes("row-line").style("align-items: stretch"):
+        with ui.element("div").classes("row-line").style("align-items: flex-start"):
             if bodies:
                 _thing_card(session, bodies, table)
             _person_card(session, table)

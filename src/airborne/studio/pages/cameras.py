@@ -20,8 +20,9 @@ from airborne.studio.stage import draw_cameras
 
 _ENDINGS = (".toml", ".txt", ".xcp", ".yml", ".yaml", ".csv")
 _HELP = (
-    "Open the calibration of any program, or click surveyed points or those of a court: six in each camera at least, "
-    "spread over the space in which the body moves. Residuals are drawn ten times as long. Or calibrate with a board."
+    "To use a calibration of any program, put its file beside the videos and reload this page. Or click surveyed "
+    "points, or those of a court: six in each camera at least, spread over the space in which the body moves; "
+    "residuals are drawn ten times as long. Or calibrate with a board."
 )
 
 

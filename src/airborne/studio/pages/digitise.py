@@ -39,9 +39,10 @@ from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
 
 _HELP = (
-    "Click the chosen point in each camera; C shows one camera alone. Grey marks say where your own clicks before and "
-    "after let the point be expected. Leave the epipolar help off where a run shall be compared without bias."
+    "Click the chosen point in each camera; C shows one camera alone. Grey marks show where to expect the point, "
+    "from your own clicks before and after. For an unbiased comparison with a run, leave the epipolar help off."
 )
+_EMPTY = "There are no points to click yet. Name one below, such as one end of the body, and press Add."
 _PREDICTED = "#c8cdd3"
 _AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing"}
 
@@ -104,7 +105,7 @@ class DigitisePanel(PointsPanel):
             with ui.element("div").classes("side"):
                 with ui.element("div").classes("card"):
                     self._build_who()
-                self.list = PointList(self.shown.names, self.choose)
+                self.list = PointList(self.shown.names, self.choose, empty=_EMPTY)
                 with ui.element("div").classes("card"):
                     self._build_points()
                     self._build_comparison()
@@ -119,8 +120,8 @@ class DigitisePanel(PointsPanel):
             change.props("flat dense")
         self.note = ui.label().classes("small")
         with ui.element("div").classes("row-line"):
-            then = ui.select(_AFTER, label="after a click choose", value=self.then, on_change=self._set_then)
-            then.props("outlined dense options-dense").style("width: 130px")
+            then = ui.select(_AFTER, label="after a click", value=self.then, on_change=self._set_then)
+            then.props("outlined dense options-dense").style("width: 150px")
             ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
 
     def _build_points(self) -> None:

@@ -25,8 +25,11 @@ class FindControls:
 
     session: Session
     what: str  # is looked for
+    use: str  # the words of the button that writes it into the trial
     show: Callable[[dict[str, Any]], Awaitable[None]]  # takes the answer, or a candidate with its frame
     candidates: tuple[dict[str, Any], ...] = ()  # where the search was undecided
+    says: str = ""  # of the start in view
+    start: dict[str, Any] | None = None  # that is in view, as it would be written
 
     def build(self) -> None:
         """Lay out the buttons, the choices, and the line that says what was found."""
@@ -54,14 +57,27 @@ class FindControls:
         if command.code == 0:
             found = json.loads(command.output())
             self.candidates = ()
-            self.note.set_text(found["note"])
+            self.says = f"Found in frame {found['frame']}, probability {found['probability']:.3g}."
             await self.show(found)
         else:
             document = read_json(self.session.folder / FOLDER / "find" / CANDIDATES)
             self.candidates = tuple({**each, "frame": document["frame"]} for each in document["candidates"])
-            self.note.set_text("The pictures do not decide between these; choose the right one.")
+            self.says = "The pictures do not decide between these; choose the right one."
             await self.show(self.candidates[0])
         self.choices.refresh()
+
+    def tell(self, start: dict[str, Any]) -> None:
+        """Take the [start] that is in view now, and say whether the trial has it."""
+        self.start = start
+        self.say()
+
+    def say(self) -> None:
+        """Say what is in view, and whether the trial has it now."""
+        if self.start is not None:
+            table = self.session.project().table("start")
+            is_used = all(table.get(key) == value for key, value in self.start.items())
+            state = "The trial has it." if is_used else f"Not yet used: press {self.use}."
+            self.note.set_text(f"{self.says} {state}")
 
     def _list_candidates(self) -> None:
         for number, each in enumerate(self.candidates, start=1):

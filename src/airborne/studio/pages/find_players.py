@@ -17,6 +17,7 @@ from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import CameraViews
 
+_USE = "Use these players"
 _HELP = (
     "Players at the net are looked for where they stand, which takes a minute or two. The world must be the court's: "
     "its origin under the middle of the net, x along the net."
@@ -37,14 +38,18 @@ class FindPlayersPanel:
     async def build(self) -> None:
         """Lay out the pictures and what can be done."""
         ui.label(_HELP).classes("help")
-        self.controls = FindControls(self.session, "players", self.show_found)
+        self.controls = FindControls(self.session, "players", _USE, self.show_found)
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
                 self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to)
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
                 self.controls.build()
-                self.use = ui.button("Use these players", on_click=self.write).props("unelevated")
+                self.use = ui.button(_USE, on_click=self.write).props("unelevated")
         self.use.set_visibility(False)
+
+    async def reread(self) -> None:
+        """Say whether the trial has what is in view."""
+        self.controls.say()
 
     def turn_to(self, frame: int) -> None:
         """Show the players in their own frame only."""
@@ -63,6 +68,8 @@ class FindPlayersPanel:
         self.use.set_visibility(bool(self.joints_m))
         self.view.go(self.at)
         self.turn_to(self.at)
+        players = [{"name": name, "joints_m": joints_m} for name, joints_m in self.joints_m.items()]
+        self.controls.tell({"frame": self.at, "player": players})
 
     def write(self) -> None:
         """Write the players into the trial."""

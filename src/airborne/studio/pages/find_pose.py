@@ -20,6 +20,7 @@ from airborne.studio.starts import pose_of, read_pose, standing_pose, start_from
 from airborne.studio.view import CameraViews, Drag
 
 _HELP = "The body is looked for where it stands out from the empty scene, which takes a minute or two."
+_USE = "Use this pose"
 _START = ("frame", "position_m", "quaternion_xyzw", "joint_angles_deg")  # what is written of an answer
 
 
@@ -39,20 +40,24 @@ class FindPanel:
         """Lay out the pictures and what can be done, and show the pose that the trial has."""
         ui.label(f"{_HELP} {DRAG_HELP}").classes("help")
         self.hand = PoseHand(self.model, self.rig.select(self.shown.names).cameras, lambda pose: None)
-        self.controls = FindControls(self.session, "body", self.show_found)
+        self.controls = FindControls(self.session, "body", _USE, self.show_found)
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
                 self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to, on_drag=self.drag)
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
                 self.controls.build()
                 ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
+                self.use = ui.button(_USE, on_click=self.write).props("unelevated")
                 FitButton(self.session, self.hand, lambda: self.at, self.take_pose)
                 self.stage = PoseStage(self.rig, self.hand, self.take_pose)
         self.use.set_visibility(False)
         if (stored := read_pose(self.session, self.model)) is not None:
             await self.draw(*stored)
             self.controls.note.set_text("The outline is the pose that the trial has.")
+
+    async def reread(self) -> None:
+        """Say whether the trial has what is in view."""
+        self.controls.say()
 
     def turn_to(self, frame: int) -> None:
         """Show the outline in its own frame only."""
@@ -70,19 +75,21 @@ class FindPanel:
         if await self.hand.follow(self.view, drag) and drag.has_ended:
             self.take_pose()
 
-    def take_pose(self, says: str = "The outline is the pose that was set by hand.") -> None:
+    def take_pose(self, says: str = "The pose was set by hand.") -> None:
         """Show the pose that the hand holds, ready to be used."""
         if self.hand.pose is not None:
             self.found = start_from_pose(self.model, self.at, self.hand.pose)
-            self.controls.note.set_text(says)
             self.use.set_visibility(True)
             self.turn_to(self.frame)
+            self.controls.says = says
+            self.controls.tell(self.found)
 
     async def show_found(self, each: dict[str, Any]) -> None:
         """Show a pose that was found, ready to be used."""
         self.found = {key: each[key] for key in _START if key in each}
         self.use.set_visibility(True)
         await self.draw(int(each["frame"]), pose_of(self.model, each))
+        self.controls.tell(self.found)
 
     async def draw(self, frame: int, pose: Pose) -> None:
         """Show a pose's outline in its frame."""

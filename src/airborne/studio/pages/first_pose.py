@@ -46,6 +46,7 @@ async def first_pose_page(session: Session) -> None:
             await _build_either(panel, find, changed)
         else:
             await find.build()
+            changed.append(find.reread)
 
 
 async def _build_either(
@@ -54,12 +55,12 @@ async def _build_either(
     """Lay out the panel for clicks, or the one that finds, as the user chooses."""
 
     async def build() -> None:
-        changed[:] = [each for each in changed if each != click.reread]
+        changed[:] = [each for each in changed if each not in (click.reread, find.reread)]
         area.clear()
+        chosen = find if choice.value == _FIND else click
         with area:
-            await (find if choice.value == _FIND else click).build()
-        if choice.value == _CLICK:
-            changed.append(click.reread)
+            await chosen.build()
+        changed.append(chosen.reread)
 
     choice = (
         ui.toggle([_CLICK, _FIND], value=_CLICK, on_change=build).props("dense no-caps").style("align-self: flex-start")

@@ -13,16 +13,23 @@ from nicegui.elements.label import Label
 from airborne.types import Array, Mask
 
 _NOT_CLICKED, _CLICKED = "–", "•"
+_NARROWEST_PX, _WIDEST_PX, _COLUMNS_PX = 24, 44, 176  # a column: 12.3 fits; cam1 does; all of them, beside the names
 
 
 class PointList:
     """Rows that stay the same elements while what they say changes, so that no click on them is lost."""
 
-    def __init__(self, cameras: Sequence[str], choose: Callable[[str], Awaitable[None]]) -> None:
-        """Begin without rows; `choose` is called with a row's point."""
-        self._cameras, self._choose = cameras, choose
+    def __init__(self, cameras: Sequence[str], choose: Callable[[str], Awaitable[None]], *, empty: str = "") -> None:
+        """Begin without rows; `choose` is called with a row's point, `empty` stands where there are no points."""
+        self._cameras, self._choose, self._empty = cameras, choose, empty
         self._rows: dict[str, tuple[Element, list[Label], Label]] = {}
-        self._card = ui.element("div").classes("card points").style("flex: 1; min-height: 120px; overflow-y: auto")
+        width = max(_NARROWEST_PX, min(_WIDEST_PX, _COLUMNS_PX // len(cameras)))
+        self._card = (
+            ui.element("div")
+            .classes("card points")
+            .style(f"--n: {width}px; flex: 1; min-height: 120px; overflow-y: auto")
+        )
+        self._build(())
 
     def show(
         self,
@@ -43,10 +50,22 @@ class PointList:
             for label, is_clicked, off in zip(labels, *off_px(name), strict=True):
                 label.set_text(_NOT_CLICKED if not is_clicked else _CLICKED if np.isnan(off) else f"{off:.1f}")
 
+    def _build_head(self) -> None:
+        """Name the columns: the cameras, and the unit."""
+        with ui.element("div").classes("point head"):
+            ui.label("residual [px]")
+            ui.element("div").classes("gap")
+            for camera in self._cameras:
+                ui.label(camera).classes("n")._props["title"] = camera  # which may be cut
+
     def _build(self, names: Sequence[str]) -> None:
         self._card.clear()
         self._rows = {}
         with self._card:
+            if not names:
+                ui.label(self._empty).classes("soft small")
+            else:
+                self._build_head()
             for name in names:
                 with ui.element("button").classes("point") as row:
                     row.on("click", partial(self._choose, name), args=[])

@@ -31,7 +31,7 @@ _NUMBERS = {
 
 async def results_page(session: Session) -> None:
     """Show every run of the folder, the newest first."""
-    async with page_frame(session, "Results", "What came of it", _HELP, scrolls=True):
+    async with page_frame(session, "Results", "What are the results?", _HELP, scrolls=True):
         runs = list_runs(session.folder)
         if not runs:
             ui.label("There is no run yet; see the step Track.").classes("warn")
