@@ -31,9 +31,9 @@ def check_command(
     else:
         for line in checks.mistakes:
             errors.print(f"airborne: {line}", style="red", markup=False)
-        if checks.mistakes:
+        if checks.mistakes and checks.well:
             errors.print("what depends on these is checked once they are mended", style="dim")
-        else:
+        elif not checks.mistakes:
             print("no mistakes: ready to be tracked")
     if checks.mistakes:
         sys.exit(2)
