@@ -121,7 +121,7 @@ class DigitisePanel(PointsPanel):
         self.note = ui.label().classes("small")
         with ui.element("div").classes("row-line"):
             then = ui.select(_AFTER, label="after a click", value=self.then, on_change=self._set_then)
-            then.props("outlined dense options-dense").style("width: 150px")
+            then.props("outlined dense options-dense").style("width: 180px")
             ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
 
     def _build_points(self) -> None:
