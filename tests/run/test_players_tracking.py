@@ -150,7 +150,7 @@ def test_folders_of_other_runs_are_left_alone(path, tmp_path):
     track_trial(read_trial(path, {"stop": 2}), tmp_path / "run", pictures=False)
     with pytest.raises(ResultError, match="already holds a run"):
         track_trial(read_trial(path, {"stop": 2}), tmp_path / "run", pictures=False)
-    with pytest.raises(ResultError, match="other settings"):
+    with pytest.raises(ResultError, match="stop = 2, now 3"):
         track_trial(read_trial(path, {"stop": 3}), tmp_path / "run", resume=True, pictures=False)
 
 

@@ -71,7 +71,7 @@ def test_another_kind_of_file_is_reported(tmp_path):
             read_sources(path)
 
 
-@pytest.mark.parametrize(("net", "said"), [('"boys"', "expected 'men' or 'women'"), ("-1", "expected greater than 0")])
+@pytest.mark.parametrize(("net", "said"), [('"boys"', "expected 'men' or 'women'"), ("-1", "expected more than 0")])
 def test_a_choice_that_is_none_names_its_place_and_no_inner_kind(tmp_path, net, said):
     path = tmp_path / "sources.toml"
     path.write_text(f'[[camera]]\nname = "a"\nsize = [100, 100]\n[court]\nfile = "x"\nnet = {net}\n')
