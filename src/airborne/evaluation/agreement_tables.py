@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from airborne.errors import ResultError
 from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.icc import Reliability
 from airborne.evaluation.repeatability import Repeatability
+from airborne.io.text import read_csv
 from airborne.io.writing import write_text
 from airborne.motion.jumps.jump import Measurement
 from airborne.motion.tables import cell
@@ -77,11 +78,10 @@ def _write(path: Path, rows: Sequence[Row]) -> None:
 def _earlier_rows(path: Path, columns: list[str]) -> list[list[str]]:
     """Return the rows of a table that has these columns; none of any other file."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            head, *rows = csv.reader(file)
-    except (OSError, ValueError, csv.Error):
+        (_, head), *rows = read_csv(path, "expected a table of agreement", ResultError)
+    except (ResultError, ValueError):
         return []
-    return [row for row in rows if len(row) == len(columns)] if head == columns else []
+    return [row for _, row in rows if len(row) == len(columns)] if head == columns else []
 
 
 def _text(value: object) -> str:

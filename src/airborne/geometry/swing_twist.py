@@ -24,13 +24,18 @@ def swing_twist_from_matrix(R: Array) -> Array:
     return out
 
 
+@kernel(is_inner=True)
+def _swing(R):
+    """Return the sine of the swing's angle, and the angle over it."""
+    sine = math.hypot(R[0, 2], R[1, 2])
+    return sine, 1.0 if sine < _SMALL else math.atan2(sine, R[2, 2]) / sine
+
+
 @kernel
 def _fill_coordinates(R, out):
     for n in range(len(R)):
-        x, y, z = R[n, 0, 2], R[n, 1, 2], R[n, 2, 2]
-        sine = math.hypot(x, y)
-        scale = 1.0 if sine < _SMALL else math.atan2(sine, z) / sine
-        out[n, 0], out[n, 1] = -scale * y, scale * x
+        _, scale = _swing(R[n])
+        out[n, 0], out[n, 1] = -scale * R[n, 1, 2], scale * R[n, 0, 2]
         out[n, 2] = math.atan2(R[n, 1, 0] - R[n, 0, 1], R[n, 0, 0] + R[n, 1, 1])
 
 
@@ -63,9 +68,7 @@ def swing_twist_jacobian(R: Array) -> Array:
 def _fill_jacobian(R, out):
     for n in range(len(R)):
         x, y, z = R[n, 0, 2], R[n, 1, 2], R[n, 2, 2]
-        sine = math.hypot(x, y)
-        is_small = sine < _SMALL
-        scale = 1.0 if is_small else math.atan2(sine, z) / sine
+        sine, scale = _swing(R[n])
         a, b = R[n, 1, 0] - R[n, 0, 1], R[n, 0, 0] + R[n, 1, 1]
         size2 = max(a * a + b * b, _SMALL**2)
         for k in range(3):  # by v, of R e_z, of the swing's angle, of a and b
@@ -73,7 +76,7 @@ def _fill_jacobian(R, out):
             by_y = -R[n, 1, 1] if k == 0 else (R[n, 1, 0] if k == 1 else 0.0)
             by_z = -R[n, 2, 1] if k == 0 else (R[n, 2, 0] if k == 1 else 0.0)
             by_scale = 0.0
-            if not is_small:
+            if sine >= _SMALL:
                 by_sine = (x * by_x + y * by_y) / sine
                 by_scale = (z * by_sine - sine * by_z - scale * by_sine) / sine
             by_a = -R[n, 0, 2] if k == 0 else (-R[n, 1, 2] if k == 1 else b)

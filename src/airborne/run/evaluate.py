@@ -42,6 +42,7 @@ from airborne.export.analysis_figures import write_bland_altman, write_identity
 from airborne.export.error_figures import write_digitised, write_errors
 from airborne.export.report import write_report
 from airborne.export.viewer import body_viewer
+from airborne.io.text import read_text
 from airborne.io.writing import write_text
 from airborne.motion import run_folder
 from airborne.motion.run_folder import check_record, holds_players, read_body_run
@@ -50,6 +51,9 @@ from airborne.run.provenance import versions
 from airborne.run.reference_series import body_series, players_series
 
 Comparisons = Mapping[str, MotionComparison | DigitisedComparison | JointComparison | PlayersComparison]
+
+_METHODS = "agreement_methods.txt"
+_LARGEST_METHODS_BYTES = 1_000_000  # a hundred comparisons; anything larger was not written here
 
 
 def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None) -> Comparisons:
@@ -110,9 +114,6 @@ def _add_to_summary(folder: Path, comparisons: Comparisons) -> dict:
     summary = run_folder.read_summary(folder) | {name: each.to_dict() for name, each in comparisons.items()}
     write_json(path, summary)
     return summary
-
-
-_METHODS = "agreement_methods.txt"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,8 +212,8 @@ def evaluate_agreement(
 
 def _read_earlier(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
+        return read_text(path, _LARGEST_METHODS_BYTES)
+    except (OSError, ValueError):
         return ""
 
 

@@ -16,10 +16,8 @@ from airborne.video import Frames, View
 
 _FEWEST = 4  # images of one camera from which the empty scene can be told
 _FEWEST_BARE = 3  # images in which a pixel shows no body, for their median to show the scene: one may be wrong
-_REDUCTION = (
-    4  # of the maps of what the body covers; they are a cell wider, as the drawn body is not quite the true one
-)
-_CELL = np.ones((3, 3), np.uint8)
+_REDUCTION = 4  # of the maps of what the body covers
+_CELL = np.ones((3, 3), np.uint8)  # they are a cell wider all round, as the drawn body is not quite the true one
 _MOST_HIDDEN = 0.15  # share of a silhouette whose scene is not shown
 
 

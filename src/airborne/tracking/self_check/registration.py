@@ -136,7 +136,7 @@ def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None
         return None
     offset = np.append(_search(silhouette, shown), 0.0)  # the last: how much wider the outline is [px]
     for sigma in _SIGMA_PX:
-        offset = refine_offset(silhouette, shown, offset, sigma)
+        offset = _refine(silhouette, shown, offset, sigma)
     length = float(max(np.ptp(np.nonzero(silhouette.mask), axis=1)))
     if not np.all(np.abs(offset[:N_SIMILARITY]) < _FARTHEST * [length, length, 1, 1]):
         return None
@@ -181,15 +181,8 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
     return best
 
 
-def refine_offset(
-    silhouette: Silhouette,
-    shown: NDArray[np.float32],
-    offset: Array,
-    sigma: float,
-    *,
-    certainty: NDArray[np.float32] | None = None,
-) -> Array:
-    """Step to the least squares of blurred silhouette and foreground, robustly; certainty (h, w) weighs the pixels.
+def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float) -> Array:
+    """Step to the least squares of blurred silhouette and foreground, robustly.
 
     offset (5,): shift, turn, scale and how much wider the outline is [px of the silhouette].
     """
@@ -204,7 +197,7 @@ def refine_offset(
         r = image_near - (drawn_near + offset[4] * steep)
         dx, dy = x - silhouette.middle[0] - offset[0], y - silhouette.middle[1] - offset[1]
         J = np.stack([-gx, -gy, gx * dy - gy * dx, -gx * dx - gy * dy, steep])
-        weight = 1 / (1 + (r / _CLIP) ** 2) ** 2 * (1 if certainty is None else certainty.ravel()[near])
+        weight = 1 / (1 + (r / _CLIP) ** 2) ** 2
         H = (J * weight) @ J.T
         H[np.diag_indices(5)] *= 1 + 1e-6
         H[4, 4] += 1e-9
