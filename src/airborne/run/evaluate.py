@@ -38,8 +38,6 @@ from airborne.evaluation.variables import (
     headline_series,
 )
 from airborne.export import write_json
-from airborne.export.analysis_figures import write_bland_altman, write_identity
-from airborne.export.error_figures import write_digitised, write_errors
 from airborne.export.report import write_report
 from airborne.export.viewer import body_viewer
 from airborne.io.text import read_text
@@ -84,6 +82,8 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
     with open_results(folder):
         summary = _add_to_summary(folder, comparisons)
         if summary and (folder / run_folder.REPORT).is_file():
+            from airborne.export.error_figures import write_digitised, write_errors
+
             figures = run_folder.figures_of(folder)
             if true_poses is not None:
                 write_errors(figures / "errors.png", motion, true_poses, symmetry)
@@ -197,6 +197,8 @@ def evaluate_agreement(
             pairs = zip(series, agreements[name], strict=True)
             plotted = [(one, row) for one, row in pairs if one.name in first and row.n > 1]
             if plotted:
+                from airborne.export.analysis_figures import write_bland_altman, write_identity
+
                 write_bland_altman(run_folder.figures_of(out) / f"agreement_{word}.png", plotted)
                 write_identity(run_folder.figures_of(out) / f"identity_{word}.png", plotted)
                 files += [f"figures/agreement_{word}.png", f"figures/identity_{word}.png"]

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from av.audio.resampler import AudioResampler
 from av.error import FFmpegError
-from scipy.signal import butter, correlate, correlation_lags, sosfilt
 
 from airborne.constants import SPEED_OF_SOUND_M_S
 from airborne.errors import VideoError
@@ -93,6 +92,8 @@ def shift_between(reference: Array, sound: Array) -> tuple[Array, Array, Array] 
 
     None where no shift stands out.
     """
+    from scipy.signal import correlate, correlation_lags  # takes a third of a second to load
+
     a, b = _envelope(reference), _envelope(sound)
     if min(len(a), len(b)) < _ENVELOPE_HZ // 4 or not (a.any() and b.any()):
         return None
@@ -112,6 +113,8 @@ def shift_between(reference: Array, sound: Array) -> tuple[Array, Array, Array] 
 
 def _envelope(sound: Array) -> Array:
     """Return the onset envelope at 500 Hz: the rises of the log level, mean removed."""
+    from scipy.signal import butter, sosfilt
+
     step = RATE_HZ // _ENVELOPE_HZ
     passed = sosfilt(butter(2, (300, 3400), "bandpass", fs=RATE_HZ, output="sos"), sound)
     power = np.asarray(passed)[: len(sound) // step * step].reshape(-1, step)

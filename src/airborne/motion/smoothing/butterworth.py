@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
-from scipy.signal import butter, sosfiltfilt
 
 from airborne.errors import ResultError
 from airborne.motion.smoothing.propagation import apply_operator
@@ -50,6 +49,8 @@ def low_pass(values: Array, *, cutoff_hz: float, rate_hz: float) -> Array:
     that the parabola makes no difference away from the ends, and free fall is preserved up to the ends. Raises
     ResultError for a cut-off not below half the rate.
     """
+    from scipy.signal import butter, sosfiltfilt  # takes a third of a second to load
+
     sections = butter(_ORDER, pass_cutoff_hz(cutoff_hz, rate_hz), fs=rate_hz, output="sos")
     u = np.linspace(-1, 1, len(values))
     terms = np.vander(u, min(3, len(values)))
