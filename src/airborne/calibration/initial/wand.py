@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -119,14 +120,17 @@ def _with_focal_lengths(
         return cameras
     focal = np.array([camera.K[0, 0] for camera in cameras])
     longer = np.array([max(camera.size) for camera in cameras], float)
-    samples = {id(pair): _sample_frames(pair, tracks) for pair in pairs}
+    samples = [_sample_frames(pair, tracks) for pair in pairs]
+
+    @cache  # most steps change one camera, and leave the pairs of the others as they are
+    def variation(k: int, focal_a: float, focal_b: float) -> float:
+        pair = pairs[k]
+        a, b = (_with_focal(cameras[i], f) for i, f in ((pair.a, focal_a), (pair.b, focal_b)))
+        return _length_variation(pair, samples[k], tracks, K_a=a.K, K_b=b.K)
 
     def misfit(focals: Array, only: int | None = None) -> float:
-        relevant = [pair for pair in pairs if only is None or only in (pair.a, pair.b)]
-        return sum(
-            _length_variation(pair, samples[id(pair)], cameras=cameras, focals=focals, tracks=tracks)
-            for pair in relevant
-        )
+        relevant = [(k, pair) for k, pair in enumerate(pairs) if only is None or only in (pair.a, pair.b)]
+        return sum(variation(k, float(focals[pair.a]), float(focals[pair.b])) for k, pair in relevant)
 
     for ratio in _FOCAL_RATIOS:  # all alike first: cameras of one recording mostly are
         guess = focal.copy()
@@ -170,13 +174,10 @@ def _with_focal(camera: Camera, focal_px: float) -> Camera:
     return replace(camera, K=np.array([[focal_px, 0, camera.K[0, 2]], [0, focal_px, camera.K[1, 2]], [0, 0, 1]]))
 
 
-def _length_variation(
-    pair: _Pair, rows: NDArray[np.integer], *, cameras: Sequence[Camera], focals: Array, tracks: WandTracks
-) -> float:
+def _length_variation(pair: _Pair, rows: NDArray[np.integer], tracks: WandTracks, *, K_a: Array, K_b: Array) -> float:
     """Return the relative variation of the wand's length in one pair, plus the share of markers behind the cameras."""
     if len(rows) < _LEAST_SHARED:
         return 0.0
-    K_a, K_b = (_with_focal(cameras[i], focals[i]).K for i in (pair.a, pair.b))
     pose, points = _relative_pose(pair, rows, tracks, K_a=K_a, K_b=K_b)
     _, variation = wand_scale(points, pair.is_inlier[rows], tracks)
     return min(variation + 1 - pose.front_share, _MOST_LENGTH_VARIATION)
