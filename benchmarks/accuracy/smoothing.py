@@ -38,7 +38,7 @@ def measure(name: str, truth: Path, run: Path) -> list[dict]:
     motion, model = read_body_run(run)
     points, _ = landmarks(motion, model)
     joints, root = smooth_landmarks(motion, model, _KALMAN, []), smooth_root(motion, model, _KALMAN, [])
-    place = _true_joints(truth, motion.time_s, [landmark.name for landmark in model.landmarks])
+    place = true_joints(truth, motion.time_s, [landmark.name for landmark in model.landmarks])
     smooth, sd = (joints[key].to_numpy()[:, : len(model.landmarks)] for key in ("position", "position_sd"))
     raw_m, smooth_m = (np.nanmean(np.linalg.norm(each - place, axis=-1)) for each in (points, smooth))
     true_w, tracked_w = _true_rates(truth, motion.time_s), _rates(motion.time_s, motion.R)
@@ -64,7 +64,8 @@ def _share(errors: Array, sd: Array) -> float:
     return float(100 * np.mean((np.abs(errors) < 2 * sd)[is_known]))
 
 
-def _true_joints(folder: Path, time_s: Array, names: list[str]) -> Array:
+def true_joints(folder: Path, time_s: Array, names: list[str]) -> Array:
+    """Return a recording's true joints at the times (n, joints, 3) [m]; NaN where unknown."""
     points = np.full((len(time_s), len(names), 3), np.nan)
     for row in _read(folder / "truth_joints.csv"):
         at = int(np.argmin(np.abs(time_s - float(row["time_s"]))))

@@ -73,3 +73,10 @@ def test_exact_equations_give_the_shares_exactly():
     np.testing.assert_allclose(blend.share, share, atol=1e-6)
     assert blend.is_mixed
     assert blend.sd_s < 1e-6
+
+
+def test_what_only_the_farthest_instants_show_is_no_second_body():
+    """A shadow, say: the body is farthest away there, and takes what nothing else explains."""
+    shares = np.array([0.06, 0, 0.05, 0.75, 0.08, 0, 0.06]), np.array([0.06, 0.1, 0.05, 0.65, 0.08, 0, 0.06])
+    A = np.broadcast_to(np.eye(7), (20, 7, 7))
+    assert [blend_of(INSTANTS_S, A, A @ share).is_mixed for share in shares] == [False, True]

@@ -22,7 +22,7 @@ from airborne.types import Array
 _SIGMA_PX = 2.0  # of a full frame
 _RIDGE = 1e-9  # of the mean curvature
 _GROUPS = 8  # left out in turn, for the jackknife
-_SECOND_BODY = 0.05  # a larger share outside the largest one and its neighbours is a second body
+_SECOND_BODY = 0.05  # a larger share inside, beside the largest one and its neighbours, is a second body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,11 +36,15 @@ class Blend:
 
     @property
     def is_mixed(self) -> bool:
-        """Whether the frames show two bodies, more than one step of the instants apart."""
+        """Whether the frames show two bodies, more than one step of the instants apart.
+
+        The shares of the first and last instant do not count: the body is farthest from where it is then, so that they
+        take what no body explains, as its shadow.
+        """
         if not np.isfinite(self.centre_s):
             return False
-        top = int(self.share.argmax())
-        return float(self.share[max(top - 1, 0) : top + 2].sum()) < 1 - _SECOND_BODY
+        is_beside = np.abs(np.arange(len(self.share)) - int(self.share.argmax())) > 1
+        return float(self.share[1:-1][is_beside[1:-1]].sum()) > _SECOND_BODY
 
 
 def blend_equations(
