@@ -139,7 +139,8 @@ def image_buffers(render_model: RenderModel, region: Region, appearance: Appeara
         light[:, 0] = 1
     else:
         light = pack_lights(render_model.lights, region.camera), np.float32(render_model.lights.ambient)
-    maps, whole = empty_maps(region.camera.size), Window(0, 0, *region.camera.size)
+    maps = empty_maps(region.camera.size, with_normals=render_model.lights is None)
+    whole = Window(0, 0, *region.camera.size)
     observation = Observation(observed, background_light, certainty)
     return ViewBuffers(region.packed_view, region.camera.K, observation, maps, whole, light)
 
