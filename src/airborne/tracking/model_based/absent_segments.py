@@ -13,8 +13,8 @@ from airborne.tracking.model_based.owners import mask_box
 
 
 @kernel(fastmath=True)
-def absence_costs_in_fitted_light(body, projection, observation, comparison, paint, light, rises):
-    """Add to rises (s,) by how much the robust squared residuals grow without each segment, all else as it is.
+def absence_costs_in_fitted_light(body, projection, observation, comparison, paint, light, is_asked, rises):
+    """Add to rises (s,) by how much the robust squared residuals grow without each segment that is asked for (s,).
 
     The residuals are those of `photometric_equations` in a light that was fitted (3, LIGHT_TERMS).
     """
@@ -27,11 +27,11 @@ def absence_costs_in_fitted_light(body, projection, observation, comparison, pai
     x0, y0, x1, y1 = box
     for layer in range(2):
         shade_body(part[layer], normals[layer], paint.albedo, light, x0, y0, lit[layer, :, y0:y1, x0:x1])
-    _add_rises(segment, lit, box, observation, comparison, rises)
+    _add_rises(segment, lit, box, observation, comparison, is_asked, rises)
 
 
 @kernel(fastmath=True)
-def absence_costs_in_known_light(body, projection, observation, comparison, lamps, ambient, rises):
+def absence_costs_in_known_light(body, projection, observation, comparison, lamps, ambient, is_asked, rises):
     """Add to rises (s,) as `absence_costs_in_fitted_light`; residuals are those of `equations_of_known_light`."""
     h, w = observation.certainty.shape
     part, segment = np.empty((2, h, w), np.int16), np.empty((2, h, w), np.int16)
@@ -44,11 +44,11 @@ def absence_costs_in_known_light(body, projection, observation, comparison, lamp
             for y in range(box.y0, box.y1):
                 for x in range(box.x0, box.x1):
                     lit[layer, k, y, x] = min(lit[layer, k, y, x] * f4(1 / 255), f4(1))
-    _add_rises(segment, lit, box, observation, comparison, rises)
+    _add_rises(segment, lit, box, observation, comparison, is_asked, rises)
 
 
 @kernel(fastmath=True, is_inner=True)
-def _add_rises(segment, lit, box, observation, comparison, rises):
+def _add_rises(segment, lit, box, observation, comparison, is_asked, rises):
     """Add the rises by the layers' segments (2, h, w) and colours (2, 3, h, w), defined on them, in the body's box.
 
     Without a segment only its own pixels change, to what is behind them; the blur carries that RADIUS_PX further.
@@ -69,7 +69,7 @@ def _add_rises(segment, lit, box, observation, comparison, rises):
     _box_segments(segment[0], boxes)
     inverse_clip2, squares = f4(1 / comparison.clip**2), np.empty((2, w), np.float32)
     for e in range(len(rises)):
-        if boxes[e, 2] == 0:
+        if boxes[e, 2] == 0 or not is_asked[e]:
             continue
         x0, y0 = max(boxes[e, 0] - RADIUS_PX, 0), max(boxes[e, 1] - RADIUS_PX, 0)
         x1, y1 = min(boxes[e, 2] + RADIUS_PX, w), min(boxes[e, 3] + RADIUS_PX, h)
