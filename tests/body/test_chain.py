@@ -12,6 +12,7 @@ from airborne.body.chain import (
     nearest_angles,
     point_jacobian,
     segment_jacobians,
+    separation_rows,
 )
 from airborne.geometry.rotations import matrix_from_angles
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -78,6 +79,15 @@ def test_points_of_one_segment_move_as_the_segment_does():
         by_segment = jacobian[:3] - np.cross(points[..., None, :] - origin, jacobian[3:].T).swapaxes(-1, -2)
         np.testing.assert_allclose(point_jacobian(posed, segment, points), by_segment, atol=EXACT)
     assert point_jacobian(posed, [], np.zeros((0, 3))).shape == (0, *jacobian[:3].shape)
+
+
+def test_two_segments_separate_as_their_points_move_apart():
+    posed, rng = MODEL.with_pose(a_pose(MODEL, 5)), np.random.default_rng(5)
+    segments = np.array([[a, b] for a in range(len(PARENTS)) for b in range(len(PARENTS))])
+    points, directions = rng.normal(size=(2, len(segments), 3))
+    first, other = (point_jacobian(posed, segments[:, side], points) for side in (0, 1))
+    rows = separation_rows(posed, segments, points, directions)
+    np.testing.assert_allclose(rows, np.einsum("ki,kij->kj", directions, first - other), atol=EXACT)
 
 
 def test_body_in_one_piece_has_the_six_columns_of_a_rigid_body():

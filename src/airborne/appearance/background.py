@@ -110,10 +110,9 @@ def inpaint(mean, n_observations, out):
     tail = 0
     for y in range(h):
         for x in range(w):
-            if n_observations[y, x] > 0:
-                done[y, x] = 1
-                for k in range(3):
-                    out[y, x, k] = mean[y, x, k]
+            done[y, x] = n_observations[y, x] > 0
+            for k in range(3):
+                out[y, x, k] = mean[y, x, k]
     for y in range(h):
         for x in range(w):
             if not done[y, x] and _count_done_neighbours(done, y, x) > 0:

@@ -19,7 +19,7 @@ _FEWEST = 30  # fewer pixels than this are not learned from
 _CLEAR_PX = 3  # this far outside the mask, a pixel is background [px of a full frame]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Region:
     """A region of interest in one view, contiguous, with the camera of exactly that region."""
 

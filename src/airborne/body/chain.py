@@ -148,6 +148,32 @@ def _point_jacobians(parents, R, t, segments, points):
     return jacobian
 
 
+def separation_rows(posed: PosedBody, segments: NDArray[np.integer], points: Array, directions: Array) -> Array:
+    """Differentiate how far a point of one segment gets from the same point of another: (k, 6 + 3 joints).
+
+    segments (k, 2) of the two, points (k, 3) world [m]; the distance is along directions (k, 3), of the first segment's
+    point less the other's. Joints above both, as the root, move both alike: their columns are zero.
+    """
+    return _separation_rows(posed.model.parents, posed.R, posed.t, segments, points, directions)
+
+
+@kernel
+def _separation_rows(parents, R, t, segments, points, directions):
+    rows = np.zeros((len(points), 3 + 3 * len(R)))
+    for k in range(len(points)):
+        point, d = points[k], directions[k]
+        for side in range(2):
+            sign, joint = 1.0 - 2.0 * side, segments[k, side]
+            while joint:
+                x, y, z = point[0] - t[joint, 0], point[1] - t[joint, 1], point[2] - t[joint, 2]
+                p, q, r = y * d[2] - z * d[1], z * d[0] - x * d[2], x * d[1] - y * d[0]  # a x (point - t) . d, by a
+                for a in range(3):
+                    turn = R[joint, 0, a] * p + R[joint, 1, a] * q + R[joint, 2, a] * r
+                    rows[k, 3 + 3 * joint + a] += sign * turn
+                joint = parents[joint]
+    return rows
+
+
 def angles_of(pose: Pose, n_joints: int) -> Array:
     """Return the joint angles (joints, 3) of a pose, where an empty array stands for straight joints."""
     return np.asarray(pose.joint_angles, float) if pose.joint_angles.size else np.zeros((n_joints, 3))

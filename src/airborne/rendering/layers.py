@@ -49,6 +49,9 @@ def draw_layers(shapes, geometry, R, t, view, lights, ambient, part, segment, va
         draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first)
         _take_row(row, first, last, geometry, view, lights, ambient, v, part[0], segment[0], values[0])
         n = _spans_behind(ends, curves, start, stop, geometry, segment[0, v], ends_behind, curves_behind)
+        if n == 0:
+            continue
+        first, last = block_range(ends_behind, 0, n)
         draw_row(row, shapes.outline, shapes.surface, ends_behind, curves_behind, 0, n, v, first)
         _take_row(row, first, last, geometry, view, lights, ambient, v, part[1], segment[1], values[1])
 
@@ -81,6 +84,11 @@ def _take_row(row, first, last, geometry, view, lights, ambient, v, part, segmen
     for b in range(first, last + 1):
         u = b * LANES
         block = row[(b - first) * BLOCK : (b - first + 1) * BLOCK]
+        nearest = f4(0)
+        for j in range(LANES):
+            nearest = max(nearest, block[W + j])
+        if nearest == 0:
+            continue
         if lights is not None:
             x = f4(view[VIEW_K] * u + view[VIEW_K + 1] * v + view[VIEW_K + 2])
             y = f4(view[VIEW_K + 3] * u + view[VIEW_K + 4] * v + view[VIEW_K + 5])

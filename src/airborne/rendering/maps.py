@@ -1,4 +1,4 @@
-"""The kernel that draws what each pixel of one view shows of a body: which part, how near, facing where."""
+"""The kernel that draws what each pixel of one view shows of a body: which part, how near, facing where or lit how."""
 
 from __future__ import annotations
 
@@ -8,8 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.kernels import kernel
-from airborne.rendering.rows import BLOCK, LANES, NX, NY, NZ, SHAPE, W, block_range, draw_row, list_spans, new_row
-from airborne.rendering.shapes import B_1, B_U, B_V, pose_shapes
+from airborne.rendering.rows import (
+    BLOCK,
+    LANES,
+    NX,
+    NY,
+    NZ,
+    RED,
+    SHADE,
+    SHAPE,
+    W,
+    block_range,
+    draw_row,
+    f4,
+    light_block,
+    list_spans,
+    new_row,
+)
+from airborne.rendering.shapes import B_1, B_U, B_V, VIEW_K, pose_shapes
 
 
 class SurfaceMaps(NamedTuple):
@@ -31,28 +47,37 @@ def empty_maps(size: tuple[int, int], *, with_normals: bool = True) -> SurfaceMa
 
 
 @kernel(fastmath=True)
-def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
+def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, values, lights=None, ambient=0.0):
     """Fill the maps of one view with the surface nearest to the camera.
 
     shapes: a workspace of `new_shapes(geometry)`; R (s, 3, 3), t (s, 3) [m] world from segment; view (18,) packed.
     part (h, w) int16: index into BodyModel.parts, -1 where there is none; inverse_depth (h, w) float32 [1/m], 0 where
     there is none, and for an ellipsoid that of the plane in which its outline lies, because only the outline's motion
-    changes the image; normals (3, h, w) float32: outward unit normals in camera axes;
-    unchanged where there is none, or not drawn.
+    changes the image. values (3, h, w) float32, unchanged where there is none, or of no size: sRGB colours 0..255 and
+    above under the packed `lights` (l, 8) and the ambient light, or where `lights` is None outward unit normals in
+    camera axes.
     """
     height, width = part.shape
     part[:] = -1
     inverse_depth[:] = 0
     pose_shapes(shapes, geometry, R, t)
     row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
-    row, with_normals = new_row(width), normals.size > 0
+    row, with_values = new_row(width), values.size > 0
     n_ellipsoids = len(geometry.ellipsoid_part)
+    x_step, y_step = f4(view[VIEW_K]), f4(view[VIEW_K + 3])
     for v in range(height):
         start, stop = row_start[v], row_stop[v]
         if stop == start:
             continue
         first, last = block_range(ends, start, stop)
         draw_row(row, shapes.outline, shapes.surface, ends, curves, start, stop, v, first)
+        if lights is not None:
+            for b in range(first, last + 1):
+                u = b * LANES
+                x = f4(view[VIEW_K] * u + view[VIEW_K + 1] * v + view[VIEW_K + 2])
+                y = f4(view[VIEW_K + 3] * u + view[VIEW_K + 4] * v + view[VIEW_K + 5])
+                block = row[(b - first) * BLOCK : (b - first + 1) * BLOCK]
+                light_block(block, lights, x, x_step, y, y_step)
         for u in range(first * LANES, min((last + 1) * LANES, width)):
             at = (u // LANES - first) * BLOCK + u % LANES
             w = row[at + W]
@@ -65,11 +90,16 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, normals):
                 else:
                     part[v, u] = geometry.polygon_part[shape - n_ellipsoids]
                     inverse_depth[v, u] = w
-                if not with_normals:
+                if not with_values:
                     continue
-                x, y, z = row[at + NX], row[at + NY], row[at + NZ]
-                length = np.sqrt(x * x + y * y + z * z)
-                normals[0, v, u], normals[1, v, u], normals[2, v, u] = x / length, y / length, z / length
+                if lights is not None:
+                    light = ambient + row[at + SHADE]
+                    for k in range(3):
+                        values[k, v, u] = light * row[at + RED + LANES * k]
+                else:
+                    x, y, z = row[at + NX], row[at + NY], row[at + NZ]
+                    length = np.sqrt(x * x + y * y + z * z)
+                    values[0, v, u], values[1, v, u], values[2, v, u] = x / length, y / length, z / length
         for b in range(last - first + 1):
             for j in range(LANES):
-                row[b * BLOCK + W + j] = 0
+                row[b * BLOCK + W + j] = row[b * BLOCK + SHADE + j] = 0

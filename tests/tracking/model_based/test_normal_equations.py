@@ -135,8 +135,8 @@ class SingleView:
         even = pack_lights(FLAT, self._region.camera), np.float32(FLAT.ambient)
         args = self._render_model.body, view.projection(posed), view.observation, comparison
         rises, costs = np.zeros((2, n)), np.empty((2, n + 1))
-        absence_costs_in_fitted_light(*args, paint, view.light, rises[0])
-        absence_costs_in_known_light(*args, *even, rises[1])
+        absence_costs_in_fitted_light(*args, paint, view.light, np.ones(n, bool), rises[0])
+        absence_costs_in_known_light(*args, *even, np.ones(n, bool), rises[1])
         for absent in range(n + 1):  # at last, none
             t = posed.t.copy()
             t[absent:][:1] -= 1e3 * self._region.camera.camera_from_world.rotation.as_matrix()[2]

@@ -9,11 +9,12 @@ from airborne.kernels import kernel
 from airborne.rendering.layers import draw_layers
 from airborne.rendering.rows import f4
 from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes
+from airborne.tracking.model_based.owners import mask_box
 
 
 @kernel(fastmath=True)
-def absence_costs_in_fitted_light(body, projection, observation, comparison, paint, light, rises):
-    """Add to rises (s,) by how much the robust squared residuals grow without each segment, all else as it is.
+def absence_costs_in_fitted_light(body, projection, observation, comparison, paint, light, is_asked, rises):
+    """Add to rises (s,) by how much the robust squared residuals grow without each segment that is asked for (s,).
 
     The residuals are those of `photometric_equations` in a light that was fitted (3, LIGHT_TERMS).
     """
@@ -22,46 +23,53 @@ def absence_costs_in_fitted_light(body, projection, observation, comparison, pai
     normals, lit = np.empty((2, 3, h, w), np.float32), np.empty((2, 3, h, w), np.float32)
     R, t, view = projection.R, projection.t, projection.packed_view
     draw_layers(body.shapes, body.geometry, R, t, view, None, f4(0), part, segment, normals)
+    box = mask_box(part[0])
+    x0, y0, x1, y1 = box
     for layer in range(2):
-        shade_body(part[layer], normals[layer], paint.albedo, light, 0, 0, lit[layer])
-    _add_rises(segment, lit, observation, comparison, rises)
+        shade_body(part[layer], normals[layer], paint.albedo, light, x0, y0, lit[layer, :, y0:y1, x0:x1])
+    _add_rises(segment, lit, box, observation, comparison, is_asked, rises)
 
 
 @kernel(fastmath=True)
-def absence_costs_in_known_light(body, projection, observation, comparison, lamps, ambient, rises):
+def absence_costs_in_known_light(body, projection, observation, comparison, lamps, ambient, is_asked, rises):
     """Add to rises (s,) as `absence_costs_in_fitted_light`; residuals are those of `equations_of_known_light`."""
     h, w = observation.certainty.shape
     part, segment = np.empty((2, h, w), np.int16), np.empty((2, h, w), np.int16)
     lit = np.empty((2, 3, h, w), np.float32)
     R, t, view = projection.R, projection.t, projection.packed_view
     draw_layers(body.shapes, body.geometry, R, t, view, lamps, ambient, part, segment, lit)
+    box = mask_box(part[0])
     for layer in range(2):
         for k in range(3):
-            for y in range(h):
-                for x in range(w):
+            for y in range(box.y0, box.y1):
+                for x in range(box.x0, box.x1):
                     lit[layer, k, y, x] = min(lit[layer, k, y, x] * f4(1 / 255), f4(1))
-    _add_rises(segment, lit, observation, comparison, rises)
+    _add_rises(segment, lit, box, observation, comparison, is_asked, rises)
 
 
 @kernel(fastmath=True, is_inner=True)
-def _add_rises(segment, lit, observation, comparison, rises):
-    """Add the rises by the layers' segments (2, h, w) and colours (2, 3, h, w).
+def _add_rises(segment, lit, box, observation, comparison, is_asked, rises):
+    """Add the rises by the layers' segments (2, h, w) and colours (2, 3, h, w), defined on them, in the body's box.
 
     Without a segment only its own pixels change, to what is behind them; the blur carries that RADIUS_PX further.
     """
     background, certainty, given = observation.background, observation.certainty, observation.rows
     c, h, w = background.shape
-    change, blurred = np.empty((c, h, w), np.float32), np.empty((c, h, w), np.float32)
+    left, top = max(box.x0 - RADIUS_PX, 0), max(box.y0 - RADIUS_PX, 0)
+    height, width = min(box.y1 + RADIUS_PX, h) - top, min(box.x1 + RADIUS_PX, w) - left
+    change, blurred = np.empty((c, height, width), np.float32), np.empty((c, height, width), np.float32)
     for k in range(c):
-        for y in range(h):
-            for x in range(w):
-                change[k, y, x] = lit[0, k, y, x] - background[k, y, x] if segment[0, y, x] >= 0 else f4(0)
+        for y in range(height):
+            ours, behind, owner = lit[0, k, top + y], background[k, top + y], segment[0, top + y]
+            for x in range(width):
+                here = ours[left + x] - behind[left + x]
+                change[k, y, x] = here if owner[left + x] >= 0 else f4(0)
     blur_planes(change, comparison.taps_u, comparison.taps_v, blurred)
     boxes = np.zeros((len(rises), 4), np.int64)
     _box_segments(segment[0], boxes)
     inverse_clip2, squares = f4(1 / comparison.clip**2), np.empty((2, w), np.float32)
     for e in range(len(rises)):
-        if boxes[e, 2] == 0:
+        if boxes[e, 2] == 0 or not is_asked[e]:
             continue
         x0, y0 = max(boxes[e, 0] - RADIUS_PX, 0), max(boxes[e, 1] - RADIUS_PX, 0)
         x1, y1 = min(boxes[e, 2] + RADIUS_PX, w), min(boxes[e, 3] + RADIUS_PX, h)
@@ -78,7 +86,7 @@ def _add_rises(segment, lit, observation, comparison, rises):
             squares[:] = 0
             for k in range(c):
                 for x in range(x1 - x0):
-                    r = row[k, x0 + x] - blurred[k, y, x0 + x]
+                    r = row[k, x0 + x] - blurred[k, y - top, x0 - left + x]
                     s = r - spread[k, y - y0, x]
                     squares[0, x] += r * r
                     squares[1, x] += s * s

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
-from airborne.body.chain import angles_of, delta_between, move_pose, point_jacobian, segment_jacobians
+from airborne.body.chain import angles_of, delta_between, move_pose, segment_jacobians, separation_rows
 from airborne.body.contact import contact_model, overlaps
 from airborne.geometry.joint_rotations import compose_rotation_vectors, rotations_of
 from airborne.geometry.swing_twist import swing_twist_from_matrix, swing_twist_jacobian
@@ -118,8 +118,7 @@ class DegreesOfFreedom:
         if not len(found.depth_m):
             return np.zeros((0, len(self.columns))), np.zeros(0)
         posed = PosedBody(self.model, R[0], t[0])
-        sphere, other = (point_jacobian(posed, found.segments[:, k], found.point) for k in (0, 1))
-        rows = -np.einsum("ki,kij->kj", found.normal, sphere - other)
+        rows = -separation_rows(posed, found.segments, found.point, found.normal)
         return rows[:, self.columns] / _OVERLAP_SD_M, found.depth_m / _OVERLAP_SD_M
 
     def _walls(self, pose: Pose, delta: Array) -> tuple[Array, Array]:

@@ -100,7 +100,7 @@ def _composite_change(render_model: RenderModel, body: PosedBody, view: ViewBuff
         paint = Paint(render_model.albedo, render_model.is_faceted)
         lit = light_fitted(*args, view.maps, paint, view.light)
     else:
-        lit = light_by_lamps(*args, *view.light, view.maps.part)
+        lit = light_by_lamps(*args, view.maps, *view.light)
     change, is_body = np.zeros_like(lit), view.maps.part >= 0
     change[:, is_body] = lit[:, is_body] - view.observation.background[:, is_body]
     return change

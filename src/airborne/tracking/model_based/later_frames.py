@@ -9,7 +9,7 @@ from airborne.body import Pose
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions
-from airborne.tracking.model_based.gauss_newton import CLOSE, NEAR
+from airborne.tracking.model_based.gauss_newton import CLOSE, CLOSE_JOINTED, NEAR
 from airborne.tracking.model_based.left_right_swap import is_nearer
 from airborne.tracking.model_based.status import Reference
 from airborne.video import Frames
@@ -45,7 +45,8 @@ def fit_next(
         if not judged[-1][1].is_suspect(reference):
             break
     expected, agreement = max(judged, key=lambda each: each[1].evidence)
-    levels = NEAR if fitter.moves_joints or agreement.is_suspect(reference) else CLOSE
+    levels = CLOSE_JOINTED if fitter.moves_joints else CLOSE
+    levels = NEAR if agreement.is_suspect(reference) else levels
     fit = fitter.fit_images([fitter.fit_silhouettes(expected, learned, levels, prior)], learned, prior)
     swaps = [pose for pose in fitter.swap_limbs(fit.pose) if is_nearer(fitter.model, pose, fit.pose, expected)]
     if swaps:

@@ -11,10 +11,9 @@ import numpy as np
 
 from airborne.appearance.lighting import LIGHT_TERMS, fit_light, flatten_shading, shade_body
 from airborne.kernels import kernel
-from airborne.rendering.drawing import draw_maps
 from airborne.rendering.maps import surface_maps
 from airborne.rendering.rows import LANES
-from airborne.tracking.model_based.blur import blur_planes
+from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes
 from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, Paint
 from airborne.tracking.model_based.owners import find_owners, mask_box
 from airborne.tracking.model_based.row_equations import add_rows
@@ -66,23 +65,25 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
     the place of paint, light and iterations, the equations of `blurred posterior - blurred mask`: the observed plane is
     the posterior (1, H, W), each pixel's probability to be body; the background is black.
     """
-    owner, nearness = _draw(body, projection, maps)
-    lit = np.empty((0, 1, 1), np.float32)
+    R, t, view = projection.R, projection.t, projection.packed_view
+    surface_maps(body.shapes, body.geometry, R, t, view, maps.part, maps.inverse_depth, maps.normals)
+    box, lit = mask_box(maps.part), np.empty((0, 1, 1), np.float32)
     if len(paint.albedo):
-        x0, y0, x1, y1 = mask_box(maps.part)
+        x0, y0, x1, y1 = box
         fit_light(observation.observed, maps.part, maps.normals, paint.albedo, light, iterations, x0, y0, x1, y1)
         lit = np.empty(maps.normals.shape, np.float32)
         shade_body(maps.part, maps.normals, paint.albedo, light, x0, y0, lit[:, y0:y1, x0:x1])
-    flat = _flatten(lit, maps.part, paint.is_faceted)
+    owner, nearness = _owners(body, len(projection.R), maps, box)
+    flat = _flatten(lit, maps.part, paint.is_faceted, box)
     return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
 @kernel(fastmath=True)
 def equations_of_known_light(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
-    owner, nearness = _draw(body, projection, maps)
-    lit = light_by_lamps(body, projection, lamps, ambient, maps.part)
-    flat = _flatten(lit, maps.part, is_faceted)
+    lit, box = light_by_lamps(body, projection, maps, lamps, ambient), mask_box(maps.part)
+    owner, nearness = _owners(body, len(projection.R), maps, box)
+    flat = _flatten(lit, maps.part, is_faceted, box)
     return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
@@ -97,39 +98,41 @@ def light_fitted(body, projection, maps, paint, light):
 
 
 @kernel(fastmath=True)
-def light_by_lamps(body, projection, lamps, ambient, part):
-    """Draw a view under known lights, filling part (h, w); return the body's colours (3, h, w), full being 1."""
-    h, w = part.shape
-    part[:] = -1
-    segment = np.empty((h, w), np.int16)
-    inverse_depth, colour = np.empty((h, w), np.float32), np.zeros((h, w, 3), np.float32)
-    R, t, view = projection.R, projection.t, projection.packed_view
-    draw_maps(body.shapes, body.geometry, R, t, view, lamps, ambient, part, segment, inverse_depth, colour)
+def light_by_lamps(body, projection, maps, lamps, ambient):
+    """Draw a view under known lights, filling its maps; return the body's colours (3, h, w), full being 1."""
+    R, t, view, (h, w) = projection.R, projection.t, projection.packed_view, maps.part.shape
     lit = np.empty((3, h, w), np.float32)
+    surface_maps(body.shapes, body.geometry, R, t, view, maps.part, maps.inverse_depth, lit, lamps, np.float32(ambient))
     for k in range(3):
         for y in range(h):
             for x in range(w):
-                lit[k, y, x] = min(colour[y, x, k] * np.float32(1 / 255), np.float32(1))
+                lit[k, y, x] = min(lit[k, y, x] * np.float32(1 / 255), np.float32(1))
     return lit
 
 
 @kernel(fastmath=True, is_inner=True)
-def _draw(body, projection, maps):
-    """Draw the maps of a view; return the segment that owns each pixel and its inverse depth, (0, 0) of one segment."""
-    R, t, view = projection.R, projection.t, projection.packed_view
-    surface_maps(body.shapes, body.geometry, R, t, view, maps.part, maps.inverse_depth, maps.normals)
-    h, w = maps.part.shape if len(R) > 1 else (0, 0)
+def _owners(body, n_segments, maps, box):
+    """Return the segment that owns each pixel that the body may move, and its inverse depth, (0, 0) of one segment."""
+    h, w = maps.part.shape if n_segments > 1 else (0, 0)
     owner, nearness = np.empty((h, w), np.int16), np.empty((h, w), np.float32)
-    if len(R) > 1:
-        find_owners(maps.part, maps.inverse_depth, body.segment_of_part, owner, nearness)
+    if h > 0 and box.x1 > 0:
+        x0, y0 = max(box.x0 - RADIUS_PX, 0), max(box.y0 - RADIUS_PX, 0)
+        x1, y1 = min(box.x1 + RADIUS_PX, w), min(box.y1 + RADIUS_PX, h)
+        part, inverse_depth = maps.part[y0:y1, x0:x1], maps.inverse_depth[y0:y1, x0:x1]
+        find_owners(part, inverse_depth, body.segment_of_part, owner[y0:y1, x0:x1], nearness[y0:y1, x0:x1])
     return owner, nearness
 
 
 @kernel(fastmath=True, is_inner=True)
-def _flatten(lit, part, is_faceted):
+def _flatten(lit, part, is_faceted, box):
     """Return the lit body's colours (c, H, W) as they move with it."""
     flat = lit
     if not is_faceted.all():
-        flat = lit.copy()
-        flatten_shading(part, is_faceted, flat)
+        x0, y0, x1, y1 = box
+        flat = np.empty_like(lit)
+        for k in range(len(lit)):
+            for y in range(y0, y1):
+                for x in range(x0, x1):
+                    flat[k, y, x] = lit[k, y, x]
+        flatten_shading(part[y0:y1, x0:x1], is_faceted, flat[:, y0:y1, x0:x1])
     return flat

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import cv2
@@ -59,10 +60,7 @@ class RenderModel:
 
     def with_pose(self, pose: Pose) -> PosedBody:
         """Pose the body; the same as `BodyModel.with_pose`."""
-        root = pose.world_from_root.as_matrix()[None]
-        joints = pose.joint_angles if pose.joint_angles.size else np.zeros((self.model.n_joints, 3))
-        R, t = self.model.pose_segments(root[:, :3, :3], root[:, :3, 3], joints[None])
-        return PosedBody(self.model, R[0], t[0])
+        return _pose_body(self.model, pose)
 
     def jacobian(self, posed: PosedBody, dofs: DegreesOfFreedom) -> Array:
         """Return the segments' twists about the root's origin by each degree of freedom, less symmetries: (s, 6, d)."""
@@ -81,10 +79,23 @@ class RenderModel:
         return maps
 
     def draw_parts(self, posed: PosedBody, region: Region) -> NDArray[np.int16]:
-        """Draw which part each pixel of a region shows: (h, w), -1 where none."""
-        maps = empty_maps(region.camera.size, with_normals=False)
-        surface_maps(self.shapes, self.geometry, posed.R, posed.t, region.packed_view, *maps)
-        return maps.part
+        """Draw which part each pixel of a region shows: (h, w), -1 where none; not to be written to."""
+        return _draw_parts(self, posed, region)
+
+
+@lru_cache(maxsize=8)  # a fit is judged in one pose several times, and each time it is drawn in all views
+def _pose_body(model: BodyModel, pose: Pose) -> PosedBody:
+    root = pose.world_from_root.as_matrix()[None]
+    joints = pose.joint_angles if pose.joint_angles.size else np.zeros((model.n_joints, 3))
+    R, t = model.pose_segments(root[:, :3, :3], root[:, :3, 3], joints[None])
+    return PosedBody(model, R[0], t[0])
+
+
+@lru_cache(maxsize=8)
+def _draw_parts(render_model: RenderModel, posed: PosedBody, region: Region) -> NDArray[np.int16]:
+    maps = empty_maps(region.camera.size, with_normals=False)
+    surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, region.packed_view, *maps)
+    return maps.part
 
 
 def _symmetry_axes(model: BodyModel) -> dict[int, Array]:
@@ -139,7 +150,8 @@ def image_buffers(render_model: RenderModel, region: Region, appearance: Appeara
         light[:, 0] = 1
     else:
         light = pack_lights(render_model.lights, region.camera), np.float32(render_model.lights.ambient)
-    maps, whole = empty_maps(region.camera.size), Window(0, 0, *region.camera.size)
+    maps = empty_maps(region.camera.size, with_normals=render_model.lights is None)
+    whole = Window(0, 0, *region.camera.size)
     observation = Observation(observed, background_light, certainty)
     return ViewBuffers(region.packed_view, region.camera.K, observation, maps, whole, light)
 

@@ -188,30 +188,21 @@ def _scale(projection):
 
 @kernel(fastmath=True, is_inner=True)
 def _add_owners(terms, at, own, has_owners, scale, x, y, segments, blocks, block):
-    """Add 16 pixels, of which (x, y) is the first, to the sums of the segments that own them."""
+    """Add 16 pixels, of which (x, y) is the first, to the sums of the segments that own them; empties `own` there."""
     fx, fy, cx, cy, ox, oy, oz = scale
     rx, ry, step, aspect = f4((x - cx) / fx), f4((y - cy) / fy), f4(1 / fx), fy / fx
-    start = 0
-    while start < LANES:
+    for start in range(LANES if has_owners else 1):
         e = own[at + start] if has_owners else 0
-        if e >= 0 and (not has_owners or _is_first(own, start, terms, at)):
-            for j in range(LANES):
-                terms[at + MINE + j] = f4(1) if not has_owners or own[at + j] == e else f4(0)
-            to = e * SUM_PLANES
-            add_segment(terms, at, segments, to, rx, step, ry, f4(fx), f4(fy), ox, oy, oz, f4(aspect * aspect))
-            for i in range(6):
-                blocks[block[0], block[1], e, i] += total_of(segments, to + GRADIENT + LANES * i)
-        start += 1 if has_owners else LANES
-
-
-@kernel(fastmath=True, is_inner=True)
-def _is_first(own, start, terms, at):
-    """Return whether a pixel is the first of its owner's 16 that has a weight."""
-    first = start if terms[at + WEIGHT + start] > 0 else LANES
-    for j in range(start):
-        if own[at + j] == own[at + start] and terms[at + WEIGHT + j] > 0:
-            first = j
-    return first == start
+        if e < 0 or (has_owners and terms[at + WEIGHT + start] == 0):
+            continue
+        for j in range(LANES):
+            terms[at + MINE + j] = f4(1) if not has_owners or own[at + j] == e else f4(0)
+        for j in range(LANES):
+            own[at + j] = -1 if own[at + j] == e else own[at + j]
+        to = e * SUM_PLANES
+        add_segment(terms, at, segments, to, rx, step, ry, f4(fx), f4(fy), ox, oy, oz, f4(aspect * aspect))
+        for i in range(6):
+            blocks[block[0], block[1], e, i] += total_of(segments, to + GRADIENT + LANES * i)
 
 
 @kernel(fastmath=True, is_inner=True)
@@ -246,8 +237,10 @@ def _add_to_world(segments, projection, sums, blocks):
     for row in range(blocks.shape[0]):
         for column in range(blocks.shape[1]):
             for e in range(blocks.shape[2]):
-                block = blocks[row, column, e]
-                if not block.any():
+                block, size = blocks[row, column, e], 0.0
+                for p in range(6):
+                    size += abs(block[p])
+                if size == 0:
                     continue
                 for p in range(6):
                     g[p] = 0.0

@@ -31,7 +31,7 @@ def count_views(
     counts = np.full(len(posed.R), len(views))
     counts[segments] = 0
     for view, noise in zip(views, noise_of_views, strict=True):
-        rises = 0.5 * _absence_costs(render_model, posed, view) / max(noise, 1e-9)
+        rises = 0.5 * _absence_costs(render_model, posed, view, segments) / max(noise, 1e-9)
         counts[segments] += rises[segments] > _STRONG_NATS
     return counts
 
@@ -72,16 +72,19 @@ def _length_m(model: BodyModel, segment: int) -> float:
     return max((float(np.linalg.norm(point)) for point in points), default=0.0)
 
 
-def _absence_costs(render_model: RenderModel, posed: PosedBody, image: ImageView) -> Array:
-    """Return by how much the robust squared residual of an image rises as each segment is taken away: (segments,).
+def _absence_costs(
+    render_model: RenderModel, posed: PosedBody, image: ImageView, segments: NDArray[np.integer]
+) -> Array:
+    """Return by how much the robust squared residual of an image rises as each of some segments is taken away: (s,).
 
     The light is that of the whole body as it was fitted, or is known.
     """
-    view, rises = image.buffers, np.zeros(len(posed.R))
+    view, rises, is_asked = image.buffers, np.zeros(len(posed.R)), np.zeros(len(posed.R), bool)
+    is_asked[segments] = True
     args = render_model.body, view.projection(posed), view.observation, image.comparison
     if render_model.lights is None:
         paint = Paint(render_model.albedo, render_model.is_faceted)
-        absence_costs_in_fitted_light(*args, paint, view.light, rises)
+        absence_costs_in_fitted_light(*args, paint, view.light, is_asked, rises)
     else:
-        absence_costs_in_known_light(*args, *view.light, rises)
+        absence_costs_in_known_light(*args, *view.light, is_asked, rises)
     return rises

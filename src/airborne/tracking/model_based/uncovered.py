@@ -46,15 +46,24 @@ def _in_one_view(
     covered = (part >= 0).astype(np.uint8)
     near = cv2.dilate(covered, _ellipse(2 * _RIM_M * px_per_m))
     stands_out = ((posterior > _BODY_LIKE) & (near == 0)).astype(np.uint8)
-    opened = cv2.morphologyEx(stands_out, cv2.MORPH_OPEN, _ellipse(_WIDTH_M * px_per_m))
+    opened = np.asarray(cv2.morphologyEx(stands_out, cv2.MORPH_OPEN, _ellipse(_WIDTH_M * px_per_m)), np.uint8)
     if not opened.any() or not covered.any():
         return opened > 0, np.zeros(len(posed.R))
-    _, label, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=8)
+    around, is_large_patch = _box(opened), np.zeros(opened.shape, bool)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(opened[around], connectivity=8)
     is_large = stats[:, cv2.CC_STAT_AREA] >= _AREA_M2 * px_per_m.prod()
     is_large[0] = False
-    owner = _nearest_part(part)[opened > 0]
+    is_large_patch[around] = is_large[label]
+    both = _box(np.asarray(opened | covered, np.uint8))
+    owner = _nearest_part(part[both])[opened[both] > 0]
     n_px = np.bincount(render_model.segment_of_part[owner], minlength=len(posed.R))
-    return is_large[label], n_px / px_per_m.prod()
+    return is_large_patch, n_px / px_per_m.prod()
+
+
+def _box(mask: NDArray[np.uint8]) -> tuple[slice, slice]:
+    """Return the rows and columns around the pixels of a mask (h, w)."""
+    x, y, width, height = cv2.boundingRect(mask)
+    return slice(y, y + height), slice(x, x + width)
 
 
 def _nearest_part(part: NDArray[np.int16]) -> NDArray[np.int16]:
