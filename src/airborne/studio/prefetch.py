@@ -18,7 +18,7 @@ from airborne.video import VideoSource
 from airborne.video.seeking import ImageIndex, ImageReader
 
 _QUIET_S = 0.15  # without a question: a browser that shows frames one after another asks again sooner
-_LOOK_AGAIN_S = 0.03
+_LOOK_AGAIN_S = 0.03  # between looks whether somebody waits
 _MOST_THREADS = 2  # each holds the decoded frames of one file: 50 MB of 1080p
 _SHORTEST = 8  # images from a key frame to the next, 30 ms of 1080p: what is decoded as fast is not made beforehand
 _LEAST_PRIORITY = 19  # of Linux
