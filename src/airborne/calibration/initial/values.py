@@ -132,14 +132,9 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
         points=points,
         wand=wand,
         detections=detections,
-        notes=(
-            *(board_detections.notes if board_detections is not None else ()),
-            *(found.notes if found is not None else ()),
-            *(detections.notes if detections is not None else ()),
-        ),
+        notes=tuple(note for each in (board_detections, found, detections) if each is not None for note in each.notes),
         findings=(
-            *(board_detections.findings if board_detections is not None else ()),
-            *(found.findings if found is not None else ()),
+            *(finding for each in (board_detections, found) if each is not None for finding in each.findings),
             *check_scales(start_of),
         ),
     )
