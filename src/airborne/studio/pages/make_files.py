@@ -23,7 +23,7 @@ class Making:
         self._folder = folder
         ui.label("For other programs").classes("soft")
         with ui.element("div").classes("row-line"):
-            self._formats = ui.select(list(EXPORT_FORMATS), label="formats; none chosen: all", value=[], multiple=True)
+            self._formats = ui.select(list(EXPORT_FORMATS), label="formats, or all", value=[], multiple=True)
             self._formats.props("outlined dense options-dense").style("min-width: 220px")
             buttons = [ui.button("Export", on_click=self.export).props("outline")]
             if any((folder / FOLDERS[2]).glob("overlay_*.mp4")):
