@@ -93,9 +93,18 @@ def test_events_of_players_are_found_unless_given(tmp_path):
     assert set(result.events) == {"Anna", "number 7"}
 
 
+def test_without_a_way_it_is_the_kalman_smoother_and_says_so(run, tmp_path, capsys):
+    assert in_process("smooth", run, "-o", tmp_path / "plain") == 0
+    assert "as with --kalman" in capsys.readouterr().err
+    assert in_process("smooth", run, "--kalman", "-o", tmp_path / "kalman") == 0
+    assert "as with" not in capsys.readouterr().err
+    plain, kalman = (sorted((tmp_path / each).rglob("*.csv")) for each in ("plain", "kalman"))
+    assert len(plain) == len(kalman) > 1
+    assert all(a.read_bytes() == b.read_bytes() for a, b in zip(plain, kalman, strict=True))
+
+
 def test_what_cannot_be_done_is_refused_in_one_line(run, tmp_path, capsys):
-    assert "say how to smooth" in refusal(capsys, "smooth", run)
-    assert "say how to smooth" in refusal(capsys, "smooth", run, "--kalman", "--spline")
+    assert "give one way to smooth" in refusal(capsys, "smooth", run, "--kalman", "--spline")
     assert "below 25 Hz" in refusal(capsys, "smooth", run, "--butterworth", "25")
     assert "--butterworth is 'six'" in refusal(capsys, "smooth", run, "--butterworth", "six")
     assert "from 0.000 to 0.780 s" in refusal(capsys, "smooth", run, "--spline", "--events", "0.2,7")

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import count
+from time import monotonic, sleep
 
 import cv2
 import numpy as np
@@ -10,21 +11,28 @@ import pytest
 from airborne.errors import VideoError
 from airborne.studio import image_lists
 from airborne.studio.image_lists import read_or_list
-from airborne.studio.pictures import Pictures, _Store
+from airborne.studio.jpeg_store import JpegStore, Key
+from airborne.studio.pictures import Pictures
 from airborne.trial.cameras import CameraTable
 from airborne.video import VideoSource
+from airborne.video.seeking import ImageReader
 from tests.support.clips import numbered, write_clip
 
 
-def test_the_store_forgets_what_was_asked_for_longest_ago():
-    store = _Store(most_bytes=100)
-    source = VideoSource("a", "unused")
-    for number in range(4):
-        store.add((source, number, 1), bytes(40))
-        store.find((source, 0, 1))
-    assert [store.find((source, number, 1))[0] for number in range(4)] == [True, False, False, True]
-    store.add((source, 0, 1), None)  # damaged: known, and no bytes
-    assert store.find((source, 0, 1)) == (True, None)
+def test_the_store_forgets_what_was_written_longest_ago():
+    store, jpegs = JpegStore(most_bytes=100), {}
+    rng = np.random.default_rng(0)
+    for number in range(200):
+        key = Key(VideoSource("a", "unused"), int(rng.integers(9)), 1)
+        jpegs[key] = None if number % 7 == 0 else rng.bytes(int(rng.integers(1, 45)))
+        store.add(key, jpegs[key])
+        assert store.find(key) == (True, jpegs[key])
+        there = [each for each in jpegs if each in store]
+        assert all(store.find(each) == (True, jpegs[each]) for each in there)
+        assert sum(len(jpegs[each] or b"?") for each in there) <= 100
+    assert store.is_full and 2 <= len(there) < 9
+    store.add(key, bytes(101))
+    assert store.find(key) == (False, None)
 
 
 @pytest.fixture
@@ -73,6 +81,48 @@ def test_a_key_frame_comes_while_another_image_is_decoded_from_it(tmp_path):
     with ThreadPoolExecutor(2) as others:
         pictures.jpeg(source, 20, is_wanted=is_wanted)
         assert [each.done() for each in jpegs] == [True, True] and all(each.result() for each in jpegs)
+
+
+def wait_until(is_so):
+    end = monotonic() + 20
+    while not is_so() and monotonic() < end:
+        sleep(0.01)
+    assert is_so()
+
+
+@pytest.mark.parametrize(("gop", "parities"), [(12, 1), (12, 2), (4, 1)])
+def test_pictures_around_are_made_while_nobody_waits(tmp_path, gop, parities):
+    coded = {"g": str(gop), "bf": "2", "sc_threshold": "0"}
+    path = write_clip(tmp_path / "a.mp4", numbered(36), codec="libx264", pix_fmt="yuv420p", options=coded)
+    source = VideoSource("a", path, fields="top-first" if parities == 2 else "progressive")
+    pictures, plain = Pictures(tmp_path), Pictures(tmp_path)
+    decoded, image_of = [], ImageReader.image
+    pictures.jpeg(source, 5 * parities, 2)
+    pictures.jpeg(source, 20 * parities, 1, is_passing=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ImageReader, "image", lambda *a, **k: decoded.append(a[1]) or image_of(*a, **k))
+        pictures.prefetch.start()
+        if gop > 8:
+            wait_until(lambda: len(decoded) == 36 * parities - 1)
+        sleep(0.3)
+        pictures.prefetch.close()
+        assert sorted(decoded) == ([n for n in range(36 * parities) if n != 5 * parities] if gop > 8 else [])
+        decoded.clear()
+        jpegs = [pictures.jpeg(source, number, 2) for number in range(36 * parities)]
+        assert not (decoded and gop > 8)
+    assert jpegs == [plain.jpeg(source, number, 2) for number in range(36 * parities)]
+
+
+def test_nothing_is_made_beforehand_while_somebody_waits(tmp_path):
+    path = write_clip(tmp_path / "a.mp4", numbered(30), codec="libx264", pix_fmt="yuv420p", options={"g": "30"})
+    pictures, source = Pictures(tmp_path), VideoSource("a", path)
+    pictures.jpeg(source, 3)
+    with pictures.prefetch.waiting(Key(source, 0, 1), is_passing=False):
+        pictures.prefetch.start()
+        sleep(0.5)
+        assert Key(source, 12, 1) not in pictures._store
+    wait_until(lambda: Key(source, 29, 1) in pictures._store)
+    pictures.prefetch.close()
 
 
 def test_a_trial_is_shown_with_its_sizes_and_clock(source, tmp_path):

@@ -13,12 +13,14 @@ from airborne.errors import AirborneError
 from airborne.io.terminal import Stages
 from airborne.io.writing import write_text
 
+_TABLES = (".csv", ".tsv", ".txt")  # other files are videos
+
 
 def calibrate_command(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="A file of sources (.toml); or a table of control points (.csv); or with --board each camera's video."
+            help="A file of sources (.toml); or a table of points (.csv); or each camera's video of a board or a wand."
         ),
     ],
     *,
@@ -39,7 +41,9 @@ def calibrate_command(
     ] = None,
     wand: Annotated[
         float | None,
-        typer.Option(help="The file holds the tracks of a wand; the distance of its two markers in metres."),
+        typer.Option(
+            help="The videos show a wand, or the table holds its tracks; its two markers' distance in metres."
+        ),
     ] = None,
     fisheye: Annotated[bool, typer.Option("--fisheye", help="With --board: the lenses are fisheyes.")] = False,
     report: Annotated[
@@ -58,7 +62,8 @@ def calibrate_command(
     if board is None and files[0].is_dir():
         raise AirborneError(f"{files[0]} is a folder; give a table or a file of sources, or --board for its images")
     if court is not None or wand is not None:
-        sources = _table_sources(files, court, wand, size)
+        is_filmed = court is None and (len(files) > 1 or files[0].suffix.lower() not in _TABLES)
+        sources = _wand_sources(files, wand, size) if is_filmed else _table_sources(files, court, wand, size)
         _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
         return
     if board is None and len(files) == 1 and files[0].suffix.lower() != ".toml":
@@ -120,12 +125,32 @@ def _board_sources(videos: list[Path], board: Path, timestamps: Path | None, fis
     return sources_from({"camera": cameras, "board": table}, Path(), "the videos")
 
 
+def _wand_sources(videos: list[Path], length_m: float | None, size: str | None) -> Any:
+    """Return the sources of a wand in videos; cameras are named like these."""
+    from airborne.calibration import sources_from
+
+    if size is not None:
+        raise AirborneError("--size goes with a table; videos have their own")
+    _check_wand(length_m)
+    cameras = [{"name": path.stem, "video": str(path.resolve())} for path in videos]
+    return sources_from({"camera": cameras, "wand": {"length_m": length_m}}, Path(), "the videos")
+
+
+def _check_wand(length_m: float | None) -> None:
+    from airborne.calibration.sources.wand import LENGTH_RANGE_M
+
+    if length_m is not None and not LENGTH_RANGE_M[0] <= length_m <= LENGTH_RANGE_M[1]:
+        raise AirborneError(
+            f"--wand {length_m:g}: expected the distance between the two markers, {LENGTH_RANGE_M[0]:g} to "
+            f"{LENGTH_RANGE_M[1]:g} metres, not millimetres"
+        )
+
+
 def _table_sources(files: list[Path], court: str | None, wand_m: float | None, size: str | None) -> Any:
     """Return the sources of one table: clicked points of a court, or a wand's tracks (cameras named by --size)."""
     from airborne.calibration import sources_from
     from airborne.calibration.sources.control_points import read_control_points
     from airborne.calibration.sources.court import court_points
-    from airborne.calibration.sources.wand import LENGTH_RANGE_M
     from airborne.cameras.formats.dltdv import read_xypts
     from airborne.cameras.formats.options import FileOptions
 
@@ -133,11 +158,7 @@ def _table_sources(files: list[Path], court: str | None, wand_m: float | None, s
         raise AirborneError("--court and --wand go with one table each; for several sources write a file of sources")
     if size is None:
         raise AirborneError("--size is missing: give the image size in pixels, such as 1920x1080")
-    if wand_m is not None and not LENGTH_RANGE_M[0] <= wand_m <= LENGTH_RANGE_M[1]:
-        raise AirborneError(
-            f"--wand {wand_m:g}: expected the distance between the two markers, {LENGTH_RANGE_M[0]:g} to "
-            f"{LENGTH_RANGE_M[1]:g} metres, not millimetres"
-        )
+    _check_wand(wand_m)
     path = files[0].resolve()
     if court is not None:
         net = court if court in ("men", "women") else _metres(court)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from airborne.cli.console import Json, progress
+from airborne.cli.console import Json, errors, progress
 from airborne.errors import ResultError
 
 if TYPE_CHECKING:
@@ -37,11 +37,16 @@ def smooth_command(
 ) -> None:
     """Smooth a run and compute velocities and accelerations: new tables beside the raw ones.
 
+    Without --butterworth, --spline or --kalman the Kalman smoother, which uses the run's own covariances.
+
     Example: airborne smooth results --butterworth 6 --fill 0.1
     """
     from airborne.export.summary import json_ready
     from airborne.run.smooth import smooth_run
 
+    if butterworth is None and not (spline or kalman):
+        kalman = True
+        errors.print("smoothing as with --kalman, by the run's own covariances, since no way is given", markup=False)
     settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
         done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)
@@ -54,7 +59,7 @@ def _smoothing(
     from airborne.motion.smoothing.smoother import Smoothing
 
     if (butterworth is not None) + spline + kalman != 1:
-        raise ResultError("say how to smooth, one way: --butterworth 6, --butterworth auto, --spline or --kalman")
+        raise ResultError("give one way to smooth: --butterworth 6, --butterworth auto, --spline or --kalman")
     if butterworth is not None:
         cutoff_hz = None if butterworth == "auto" else _number(butterworth, "--butterworth", "a cut-off in Hz, or auto")
         return Smoothing(method="butterworth", cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)

@@ -32,7 +32,7 @@ def kernel(
 
     `fastmath` lets sums change their order, `inline="always"` copies the function into the kernels that call it. What
     `is_inner` is called by kernels only, and cached only as a part of them. With a `signature` the function is compiled
-    for these types, and when it is imported.
+    for these types, whichever it is called with.
     """
     if function is None:
         return lambda f: kernel(f, fastmath=fastmath, inline=inline, is_inner=is_inner, signature=signature)
@@ -52,8 +52,13 @@ def kernel(
     if not is_inner:
         compiled._cache = KernelCache(compiled)
     if signature is not None:
-        compiled.compile(signature)
-        compiled.disable_compile()
+
+        def compile_once(*_: Any) -> Any:
+            machine_code = compiled.compile(signature)
+            compiled.disable_compile()
+            return machine_code
+
+        compiled._compile_for_args = compile_once  # which Numba calls for types that are not compiled yet
     return compiled
 
 

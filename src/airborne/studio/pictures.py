@@ -15,19 +15,19 @@ import numpy as np
 from airborne.errors import VideoError
 from airborne.export.pictures import encode_jpeg
 from airborne.studio.image_lists import read_or_list
+from airborne.studio.jpeg_store import JpegStore, Key
+from airborne.studio.prefetch import Prefetch
 from airborne.trial.cameras import CameraTable
 from airborne.types import Image
 from airborne.video import VideoSource
 from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, match_images
 
-_MOST_BYTES = 40_000_000  # of JPEG that are kept for other windows; the browser keeps its own
+_MOST_BYTES = 300_000_000  # of JPEG on the disk: three cameras of 1080p for a minute, at a quarter of their size
 _MOST_OPEN = 32  # files
 _LOOK_AGAIN_S = 0.02  # while another thread holds a file, whether it has passed the key frame that is asked for
 _INDEXING = 2  # files at once: four threads take three times the CPU time of one, waiting for the interpreter
 
 SHRINKS = (1, 2, 4)  # times smaller than the video, as pictures are asked for
-
-Key = tuple[VideoSource, int, int]  # a video, its image's number, and how many times smaller
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,30 +48,6 @@ class ShownTrial:
     def sizes(self) -> dict[str, tuple[int, int]]:
         """Camera -> (width, height) [px]."""
         return {source.name: index.facts.size for source, index in zip(self.sources, self.indexes, strict=True)}
-
-
-class _Store:
-    """The newest JPEGs, as many as fit."""
-
-    def __init__(self, most_bytes: int) -> None:
-        self._most, self._n_bytes, self._lock = most_bytes, 0, Lock()
-        self._jpegs: OrderedDict[Key, bytes | None] = OrderedDict()
-
-    def find(self, key: Key) -> tuple[bool, bytes | None]:
-        """Return whether a picture is there, and the picture; None where it is damaged."""
-        with self._lock:
-            if key not in self._jpegs:
-                return False, None
-            self._jpegs.move_to_end(key)
-            return True, self._jpegs[key]
-
-    def add(self, key: Key, jpeg: bytes | None) -> None:
-        with self._lock:
-            old = self._jpegs.pop(key, None)
-            self._jpegs[key] = jpeg
-            self._n_bytes += len(jpeg or b"") - len(old or b"")
-            while self._n_bytes > self._most:
-                self._n_bytes -= len(self._jpegs.popitem(last=False)[1] or b"")
 
 
 class _Video:
@@ -123,7 +99,8 @@ class Pictures:
 
     def __init__(self, memory: Path) -> None:
         """Open nothing yet; when the videos' images are shown is remembered in a folder."""
-        self._memory, self._store, self._lock = memory, _Store(_MOST_BYTES), Lock()
+        self._memory, self._store, self._lock = memory, JpegStore(_MOST_BYTES), Lock()
+        self.prefetch = Prefetch(self._store, self.index, _encode)
         self._videos: OrderedDict[VideoSource, _Video] = OrderedDict()
 
     def index(self, source: VideoSource) -> ImageIndex:
@@ -131,17 +108,27 @@ class Pictures:
         return self._video(source).index()
 
     def jpeg(
-        self, source: VideoSource, number: int, shrink: int = 1, is_wanted: Callable[[], bool] = lambda: True
+        self,
+        source: VideoSource,
+        number: int,
+        shrink: int = 1,
+        is_wanted: Callable[[], bool] = lambda: True,
+        *,
+        is_passing: bool = False,
     ) -> bytes | None:
         """Return an image of a file, one of `SHRINKS` times smaller; None where it is damaged.
 
+        Others around it are made while nobody waits, unless it is looked at in passing.
+
         Raises VideoError for a number that is not there, and where it is no longer wanted before it is decoded.
         """
-        is_there, jpeg = self._store.find((source, number, shrink))
-        if not is_there:
-            image = self._video(source).decode(number, is_wanted)
-            jpeg = None if image is None else _encode(image, shrink)
-            self._store.add((source, number, shrink), jpeg)
+        key = Key(source, number, shrink)
+        with self.prefetch.waiting(key, is_passing=is_passing):
+            is_there, jpeg = self._store.find(key)
+            if not is_there:
+                image = self._video(source).decode(number, is_wanted)
+                jpeg = None if image is None else _encode(image, shrink)
+                self._store.add(key, jpeg)
         return jpeg
 
     def image(self, source: VideoSource, number: int) -> Image | None:

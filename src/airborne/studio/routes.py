@@ -189,7 +189,8 @@ def _picture(session: Session, camera: int, number: int, wish: Wish) -> Response
         return Response(status_code=404)
     if wish.is_near and number >= 0:
         number = shown.indexes[camera].key_before(number)
-    jpeg = None if number < 0 else session.pictures.jpeg(shown.sources[camera], number, wish.shrink, wish.is_wanted)
+    source, make = shown.sources[camera], session.pictures.jpeg
+    jpeg = None if number < 0 else make(source, number, wish.shrink, wish.is_wanted, is_passing=wish.is_near)
     if jpeg is None:
         return Response(status_code=204)  # this camera has no picture then
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)

@@ -73,9 +73,11 @@ def serve(path: Path, *, port: int, browser: bool, is_guided: bool) -> None:
         print(f"airborne studio: {address}\nCtrl-C ends it", flush=True)
         if browser:
             webbrowser.open(address)
+        session.pictures.prefetch.start()
 
     binding.MAX_PROPAGATION_TIME = math.inf  # [s]; beyond it NiceGUI writes a line for developers to the terminal
     app.on_startup(announce)
+    app.on_shutdown(session.pictures.prefetch.close)
     app.on_shutdown(lambda: [command.stop() for command in session.commands.values()])
     ui.run(
         host=_HOST,

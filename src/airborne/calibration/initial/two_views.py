@@ -46,7 +46,10 @@ def fit_epipolar_geometry(px_a: Array, px_b: Array, *, limit_px: float) -> Epipo
     """
     if len(px_a) < _FEWEST_POINTS:
         return None
-    F, mask = cv2.findFundamentalMat(px_a, px_b, cv2.USAC_MAGSAC, limit_px, _CONFIDENCE, _MOST_TRIES)
+    try:
+        F, mask = cv2.findFundamentalMat(px_a, px_b, cv2.USAC_MAGSAC, limit_px, _CONFIDENCE, _MOST_TRIES)
+    except cv2.error:  # of points that fit none at all
+        return None
     if F is None or F.shape != (3, 3) or not np.all(np.isfinite(F)):
         return None
     return EpipolarGeometry(F.astype(float), mask.ravel().astype(bool))

@@ -15,14 +15,14 @@ from airborne.calibration.sources.board_detection import BoardDetections, detect
 from airborne.calibration.sources.boards import Board, board_from_table, read_board
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
 from airborne.calibration.sources.court import court_points
-from airborne.calibration.sources.files import CameraSource, PixelConventionName, Sources
+from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.calibration.sources.scene_points import initial_rig_from_points
-from airborne.calibration.sources.wand import WandTracks, read_wand
+from airborne.calibration.sources.wand import WandTracks
+from airborne.calibration.sources.wand_detection import find_wand
 from airborne.calibration.world_frame.alignment import merge_rigs
-from airborne.cameras import Camera, Detections, PixelConvention, Rig, read_rig
+from airborne.cameras import Camera, Detections, Rig, read_rig
 from airborne.cameras.detections import read_detections
 from airborne.cameras.finding import Finding
-from airborne.cameras.formats.options import FileOptions
 from airborne.cameras.units import check_scales
 from airborne.errors import CalibrationError
 from airborne.types import Progress, StageProgress
@@ -66,7 +66,8 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
         points["control points"] = read_control_points(sources.path(sources.control_points.file))
     if sources.court is not None:
         points["court"] = read_control_points(sources.path(sources.court.file), court_points(sources.court.net))
-    wand = _wand(sources, sizes)
+    found = find_wand(sources, sizes, lambda done, n: progress("looking for the wand", done, n))
+    wand = None if found is None else found.tracks
     fisheyes = [camera.name for camera in sources.camera if camera.lens == "fisheye"]
     detections = None
     if sources.detections is not None:
@@ -131,18 +132,12 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
         points=points,
         wand=wand,
         detections=detections,
-        notes=(
-            *(board_detections.notes if board_detections is not None else ()),
-            *(detections.notes if detections is not None else ()),
+        notes=tuple(note for each in (board_detections, found, detections) if each is not None for note in each.notes),
+        findings=(
+            *(finding for each in (board_detections, found) if each is not None for finding in each.findings),
+            *check_scales(start_of),
         ),
-        findings=(*(board_detections.findings if board_detections is not None else ()), *check_scales(start_of)),
     )
-
-
-def pixel_convention(name: PixelConventionName) -> PixelConvention:
-    """Return the pixel convention of a name."""
-    corner, _, base = name.rpartition("-")
-    return PixelConvention("lower-left" if corner == "lower-left" else "upper-left", int(base))
 
 
 def _detect_boards(
@@ -253,15 +248,6 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
         chain_cameras([known_lenses[views.cameras[c]] for c in group], views.select_cameras(group))[0]
         for group in groups
     ]
-
-
-def _wand(sources: Sources, sizes: dict[str, tuple[int, int]]) -> WandTracks | None:
-    table = sources.wand
-    if table is None:
-        return None
-    options = FileOptions(size=dict(sizes), pixels=pixel_convention(table.pixels))
-    lengths = table.lengths_m or [table.length_m or 0.0]
-    return read_wand(sources.path(table.file), table.cameras or sources.names, options, lengths)
 
 
 def _common(cameras: tuple[str, ...], sizes: dict[str, tuple[int, int]]) -> list[str]:

@@ -51,7 +51,7 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
     if not cameras:
         raise CalibrationError("[board] needs a video or images of the cameras; add video = ... to each [[camera]]")
     if all(camera.video for camera in cameras):
-        moments, time_s, findings = _moments(sources, cameras)
+        moments, time_s, findings = match_moments(sources, cameras)
     elif all(camera.pictures for camera in cameras):
         counts = [len(_image_paths(sources, camera.pictures or "")) for camera in cameras]
         if len(cameras) > 1 and len(set(counts)) > 1:
@@ -127,7 +127,7 @@ def image_size(sources: Sources, camera: CameraSource) -> tuple[int, int] | None
     return None
 
 
-def _moments(
+def match_moments(
     sources: Sources, cameras: Sequence[CameraSource]
 ) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
     """Return by camera the moment of each of its frames, the moments' times, and what is wrong with them."""
@@ -209,13 +209,18 @@ def _read_grey_images(sources: Sources, camera: CameraSource, indices: Container
             if index in indices:
                 yield index, _read_grey_image(path)
         return
+    for index, rgb in read_video_images(sources, camera, indices):
+        yield index, np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), np.uint8)
+
+
+def read_video_images(sources: Sources, camera: CameraSource, indices: Container[int]) -> Iterator[tuple[int, Image]]:
+    """Yield some images (h, w, 3) sRGB of a camera's video, with their indices. Raises VideoError."""
     source = VideoSource(camera.name, sources.path(camera.video or ""))
     facts = inspect(source)
     for picture in decode(source, facts):
         index = round(picture.time_s * facts.frame_rate)
         if index in indices:
-            grey = cv2.cvtColor(rgb_from_decoded(picture, facts), cv2.COLOR_RGB2GRAY)
-            yield index, np.asarray(grey, np.uint8)
+            yield index, rgb_from_decoded(picture, facts)
 
 
 def _image_paths(sources: Sources, pattern: str) -> list[Path]:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
+from airborne.cameras import PixelConvention
 from airborne.errors import CalibrationError, one_line
 from airborne.io.names import CheckedPath, Name
 from airborne.io.text import list_keys, read_toml
@@ -24,7 +25,7 @@ class CameraSource(_Strict):
     """One camera: its recording, or only its image size."""
 
     name: Name
-    video: CheckedPath | None = None  # shows the board together with the other cameras
+    video: CheckedPath | None = None  # shows the board or the wand together with the other cameras
     pictures: CheckedPath | None = None  # the same as images: a folder or a pattern such as "left/*.png"
     lens_video: CheckedPath | None = None  # shows the board to this camera alone, for its lens
     lens_pictures: CheckedPath | None = None
@@ -81,9 +82,9 @@ class CourtSource(_Strict):
 
 
 class WandSource(_Strict):
-    """A stick of known length that is waved about."""
+    """A stick of known length that is waved about; without a file it is looked for in the cameras' videos."""
 
-    file: CheckedPath
+    file: CheckedPath | None = None
     length_m: Positive | None = None
     lengths_m: list[Positive] | None = None
     pixels: PixelConventionName = "upper-left-1"
@@ -93,6 +94,8 @@ class WandSource(_Strict):
     def _one_length(self) -> WandSource:
         if (self.length_m is None) == (self.lengths_m is None):
             raise ValueError("give length_m, or lengths_m between the markers in a row")
+        if self.file is None and self.length_m is None:
+            raise ValueError("a wand found in videos has two markers: give length_m, or file = their table")
         return self
 
 
@@ -166,6 +169,12 @@ class Sources(_Strict):
     def path(self, name: str) -> Path:
         """Return the path of a file named here."""
         return self._folder / name
+
+
+def pixel_convention(name: PixelConventionName) -> PixelConvention:
+    """Return the pixel convention of a name."""
+    corner, _, base = name.rpartition("-")
+    return PixelConvention("lower-left" if corner == "lower-left" else "upper-left", int(base))
 
 
 def read_sources(path: Path) -> Sources:

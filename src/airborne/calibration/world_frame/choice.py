@@ -9,7 +9,8 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.bundle import Adjustment
-from airborne.calibration.initial.values import Inputs, pixel_convention
+from airborne.calibration.initial.values import Inputs
+from airborne.calibration.sources.files import pixel_convention
 from airborne.calibration.sources.person import align_rigs
 from airborne.calibration.world_frame.alignment import estimate_gravity, frame_of_gravity, frame_of_three_points
 from airborne.cameras.clicks import read_clicks

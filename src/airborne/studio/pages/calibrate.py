@@ -35,12 +35,13 @@ from airborne.studio.session import Session
 _BOARD = "board.toml"  # of a new one
 _HELP = (
     "Each camera films the board close by, in every corner of its picture and tilted; then two cameras at once, until "
-    "all are linked. Or wave a wand of two markers. In the pictures below, points should cover each camera's image, "
-    "and arrows point in all directions."
+    "all are linked. Or wave a wand, two balls unlike all else on a dark stick: it is found by itself. In the pictures "
+    "below, points should cover each camera's image, and arrows point in all directions."
 )
-_NO_WAND = (
-    "For a wand, click its two ends in some twenty frames of these videos, in the step Digitise, or put the table of "
-    "its markers here that DLTdv, easyWand or Argus tracked (…xypts.csv)."
+_FILMED = "found in the videos"  # of a wand, instead of its table
+_WAND_HELP = (
+    "The ends of a wand that is not found can be clicked in some twenty frames, in the step Digitise; or put the table "
+    "of its markers here that DLTdv, easyWand or Argus tracked (…xypts.csv)."
 )
 
 
@@ -66,18 +67,14 @@ class CalibratePanel:
             self._board_form()
             with ui.element("div").classes("row-line"):
                 board = ui.button("Calibrate with the board", on_click=self.use_board).props("unelevated")
-                buttons = [board]
-                if wands:
-                    self.wand = ui.select(wands, label="tracks of a wand", value=wands[0])
-                    self.wand.props("outlined dense options-dense").style("min-width: 180px")
-                    self.length = ui.number("its length [m]", min=0.05, max=10, value=0.5, step=0.001)
-                    self.length.props("outlined dense").style("width: 120px")
-                    wand = ui.button("Calibrate with the wand", on_click=self.use_wand).props("unelevated")
-                    buttons.append(wand)
-                else:
-                    ui.label(_NO_WAND).classes("soft small")
+                self.wand = ui.select([*wands, _FILMED], label="wand", value=[*wands, _FILMED][0])
+                self.wand.props("outlined dense options-dense").style("min-width: 180px")
+                self.length = ui.number("its length [m]", min=0.05, max=10, value=0.5, step=0.001)
+                self.length.props("outlined dense").style("width: 120px")
+                wand = ui.button("Calibrate with the wand", on_click=self.use_wand).props("unelevated")
                 self.watch = CommandWatch(self.session, "calibrate", self.take, words="calibrating")
-                self.watch.buttons = buttons
+                self.watch.buttons = [board, wand]
+            ui.label(_WAND_HELP).classes("soft small")
             self.results = ui.refreshable(self._show_results)
             self.results()
         dialog.on("hide", lambda: ui.navigate.reload() if self.is_new else None)
@@ -94,13 +91,17 @@ class CalibratePanel:
     def use_wand(self) -> None:
         """Start the calibration with a wand."""
         with errors_shown():
-            media = {name: {"size": list(size)} for name, size in self.shown.sizes.items()}
+            length = {"length_m": float(self.length.value or 0)}
             folder, name = self.session.folder, str(self.wand.value)
+            if name == _FILMED:
+                self._start({"wand": length}, {camera: {"video": video} for camera, video in self.videos.items()})
+                return
+            media = {camera: {"size": list(size)} for camera, size in self.shown.sizes.items()}
             if name in (each.file for each in list_repetitions(folder)):
                 clicks = read_clicked_frames(folder / name, self.shown.names)
                 name = f"wand_{name}"
                 self.session.edit(name, wand_text(self.session.project(), clicks), "a wand's ends clicked")
-            self._start({"wand": {"file": name, "length_m": float(self.length.value or 0)}}, media)
+            self._start({"wand": {"file": name, **length}}, media)
 
     def take(self, command: Command) -> None:
         """Use the calibration that was made."""

@@ -7,7 +7,6 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.errors import AirborneError
 from airborne.motion.run_folder import FOLDERS
 from airborne.run.export import EXPORT_FORMATS
 from airborne.studio.commands import Command
@@ -24,8 +23,8 @@ class Making:
         self._folder = folder
         ui.label("For other programs").classes("soft")
         with ui.element("div").classes("row-line"):
-            self._formats = ui.select(list(EXPORT_FORMATS), label="formats", value=["c3d"], multiple=True)
-            self._formats.props("outlined dense options-dense").style("min-width: 160px")
+            self._formats = ui.select(list(EXPORT_FORMATS), label="formats, or all", value=[], multiple=True)
+            self._formats.props("outlined dense options-dense").style("min-width: 220px")
             buttons = [ui.button("Export", on_click=self.export).props("outline")]
             if any((folder / FOLDERS[2]).glob("overlay_*.mp4")):
                 buttons.append(self._film())
@@ -37,8 +36,6 @@ class Making:
     def export(self) -> None:
         """Start `airborne export`."""
         with errors_shown():
-            if not self._formats.value:
-                raise AirborneError("choose a format, such as c3d")
             self._watch.start("export", self._folder.name, *(f"--{kind}" for kind in self._formats.value))
 
     def film(self) -> None:
