@@ -22,7 +22,7 @@ _ENDINGS = (".toml", ".txt", ".xcp", ".yml", ".yaml", ".csv")
 _HELP = (
     "To use a calibration of any program, put its file beside the videos and reload this page. Or click surveyed "
     "points, or those of a court: six in each camera at least, spread over the space in which the body moves; "
-    "residuals are drawn ten times as long. Or calibrate with a board."
+    "residuals are drawn ten times as long. Or calibrate with a board or a wand."
 )
 
 
