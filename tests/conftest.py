@@ -54,6 +54,11 @@ def pytest_runtest_makereport(item):
         report.outcome, report.longrepr = "failed", f"skipped again: {report.longrepr[2]}"
 
 
+def pytest_sessionfinish(session, exitstatus):
+    if session.config.getoption("skipped") and exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED:
+        session.exitstatus = pytest.ExitCode.OK  # the last run skipped nothing
+
+
 def pytest_terminal_summary(terminalreporter, config):
     """Remember what was skipped."""
     config.cache.set(SKIPPED, [report.nodeid for report in terminalreporter.stats.get("skipped", [])])
