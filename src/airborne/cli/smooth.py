@@ -46,7 +46,7 @@ def smooth_command(
 
     if butterworth is None and not (spline or kalman):
         kalman = True
-        errors.print("smoothing as with --kalman, by the run's own covariances, since no way is given", markup=False)
+        errors.print("smoothing with --kalman and the run's own covariances: no method was chosen", markup=False)
     settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
         done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)

@@ -108,9 +108,9 @@ def _say_nothing_found(names: Sequence[str], blobs: Sequence[Sequence[Blobs]], g
     why = (
         "what was matched between them is too little, or not of one length: are they in step?"
         if guesses
-        else "no two of one colour, or of two colours once each, are matched between two cameras in ten frames"
+        else "two cameras must show the same two blobs, and no third of their colours, in ten frames at least."
     )
     return (
         f"no wand is found; frames with two round, moving, bright or coloured blobs: {counts}; {why} "
-        "Film two balls unlike all else on a dark stick, or digitise them and give file = their table"
+        "Film two balls unlike all else on a dark stick, or digitise them and give their table"
     )

@@ -39,6 +39,7 @@ class Correction:
         self.view: CameraViews | None = None
         cameras = run_rig(folder).select(shown.names).cameras
         self.hand = PoseHand(run_body(folder), cameras, lambda pose: self._marks(pose, {}))
+        self._seen = self._tracked = self._held()  # when this window looked last; when it last tracked
 
     def build(self) -> None:
         """Lay out the switch, the button that tracks again, and what there is to say."""
@@ -62,7 +63,19 @@ class Correction:
     async def reread(self) -> None:
         """Show what the trial holds now: undo or another window may have changed it."""
         self.masks.list.refresh()
-        self._show(self.session.frame)
+        held = self._held()
+        if held == self._seen:
+            self._show(self.session.frame)
+            return
+        self._seen = held
+        self.watch.says.set_text("" if held == self._tracked else "the corrections have changed")
+        self.again.set_visibility(held != self._tracked)
+        self.turn_to(self.session.frame)
+
+    def _held(self) -> tuple[Any, Any]:
+        """Return the keys and masks that the trial holds."""
+        tables = self.session.project().tables
+        return tables.get("key"), tables.get("mask")
 
     def _show(self, frame: int) -> None:
         if self.view is not None:
@@ -122,12 +135,14 @@ class Correction:
 
     def _note_change(self, what: str) -> None:
         """Say what was written, and offer to track again."""
+        self._seen = self._held()
         self.watch.says.set_text(what)
         self.again.set_visibility(True)
         self._show(self.session.frame)
 
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""
+        self._tracked = self._held()
         self.watch.start("track", self.session.path.name, "-o", self.folder.name, "--resume")
         self.again.set_visibility(False)
 
