@@ -56,7 +56,7 @@ def test_without_a_wand_no_wand_is_found(tmp_path):
     filmed.film_wand(tmp_path, RIG, n=24, seed=2, with_wand=False, stray=0.8)
     with pytest.raises(CalibrationError, match="no wand is found; frames with two round") as error:
         find(tmp_path)
-    assert "\n" not in str(error.value) and "file = their table" in str(error.value)
+    assert "\n" not in str(error.value) and "digitise them" in str(error.value)
 
 
 def test_two_videos_are_asked_for(tmp_path):
