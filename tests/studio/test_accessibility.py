@@ -8,7 +8,7 @@ import pytest
 from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from tests.support.clips import write_clip
 from tests.support.person_run import PERSON_TABLE, write_person_run
-from tests.support.studio import open_page, open_studio
+from tests.support.studio import fork_studio, open_page
 
 SIZE, N = (320, 240), 6
 PAGES = {  # and what is there when a page is built
@@ -44,12 +44,12 @@ def test_axe_finds_nothing_on_any_page(folder):
     reason = "THE STUDIO'S ACCESSIBILITY IS NOT TESTED: axe is not installed; pip install -e '.[test]'"
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason=reason).Axe()
     found = {}
-    with open_studio(folder) as address, open_page(address) as page:
+    with fork_studio(folder) as address, open_page(address) as page:
         for name, text in PAGES.items():
             page.goto("/".join([*address.split("/")[:3], name]))
             page.get_by_text(text).first.wait_for()
             page.wait_for_function("!document.querySelector('.q-notification')")  # those fade in and out
-            page.wait_for_timeout(500)
+            page.evaluate("Promise.all(document.getAnimations().map((each) => each.finished))")
             response = axe.run(page).response
             assert len(response["passes"]) > 20
             found[name] = [(each["id"], [node["html"] for node in each["nodes"]]) for each in response["violations"]]

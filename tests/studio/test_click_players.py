@@ -8,7 +8,7 @@ from airborne.io.text import read_toml
 from airborne.run.players_tracker import player_starts
 from airborne.trial.file import read_trial
 from tests.support.clips import write_clip
-from tests.support.studio import User, open_page, open_studio, wait_for_frame
+from tests.support.studio import User, fork_studio, open_page, wait_for_frame
 
 SIZE = (640, 480)
 LEGS = {
@@ -52,7 +52,7 @@ def click_everywhere(user, rig, name, point):
 
 
 def test_players_are_clicked_and_a_length_is_measured(rig, folder):
-    with open_studio(folder) as address, open_page(address.replace("/?", "/body?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/body?")) as page:
         user = User(page)
         user.press("Use players")
         page.get_by_text("the body is written into the trial").wait_for()

@@ -10,7 +10,7 @@ from airborne.run.first_pose import find_first_pose
 from airborne.studio.starts import standing_pose
 from airborne.trial.file import read_trial
 from tests.support.clips import write_clip
-from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
+from tests.support.studio import at_pixel, fork_studio, open_page, wait_for_frame, wait_for_still_scene
 
 SIZE = (640, 480)
 FRAME, N_FRAMES = 3, 6
@@ -75,7 +75,7 @@ def test_clicked_landmarks_become_the_first_pose(rig, folder):
     true = Pose(world_from_root=RigidTransform.from_components([0.1, 0.0, 1.0], Rotation.from_rotvec([0, 0, 0.4])))
     names, points = [each.name for each in model.landmarks], model.with_pose(true).landmarks
     rng = np.random.default_rng(0)
-    with open_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
         wait_for_frame(page, 0)
         for frame in range(1, FRAME + 1):
             page.locator("canvas.view").press(".")
@@ -116,6 +116,7 @@ def drag_handle(page, axis, *, turns):
     """Drag a handle of the 3D scene by 40 px, along its arrow or around its ring."""
     page.wait_for_selector(".nicegui-scene")
     page.wait_for_function(f"() => ({GIZMO})() !== undefined")
+    wait_for_still_scene(page)
     at = page.evaluate(HANDLE, [axis, turns])
     page.mouse.move(*at[0])
     page.mouse.down()
@@ -138,7 +139,7 @@ def use_pose(page, folder, before):
 
 def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):
     first, second = np.array([40.0, -18.0]), np.array([-55.0, 6.0])
-    with open_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
         page.wait_for_function("document.querySelector('canvas.view')?.dataset.frame !== undefined")  # it listens
         page.locator("canvas.view").press("End")
         page.get_by_text(f"No landmark is clicked in frame {N_FRAMES - 1} yet.").wait_for()

@@ -12,7 +12,7 @@ from airborne.motion import read_motion
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import MINUTE, at_pixel, go_home, open_page, open_studio, wait_for_frame, wait_for_still_scene
+from tests.support.studio import MINUTE, at_pixel, fork_studio, go_home, open_page, wait_for_frame, wait_for_still_scene
 
 FRAME, TURNED, LAST, CAMERA, DRAGGED_PX = 3, 4, 6, 1, (16.0, -12.0)
 
@@ -70,7 +70,7 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
     model = read_trial(folder / "trial.toml").model()
     name = model.landmarks[0].name
     u, v = rig.cameras[CAMERA].px_from_world(model.with_pose(before.pose(FRAME)).landmarks[0])
-    with open_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/review?")) as page:
+    with fork_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/review?")) as page:
         wait_for_frame(page, 0)
         go_home(page)
         still = wait_for_still_scene(page)

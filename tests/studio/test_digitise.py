@@ -12,7 +12,7 @@ from airborne.evaluation import fit_digitised_poses, read_digitised, read_truth
 from airborne.evaluation.digitised import body_points
 from airborne.interface import calibrate
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
+from tests.support.studio import at_pixel, fork_studio, open_page, wait_for_frame
 
 CLICK_SD_PX = 1.2  # right and down
 FRAMES = range(0, 32, 8)
@@ -25,7 +25,7 @@ def test_the_cross_digitised_by_one_person(tmp_path):
     rig = calibrate(folder / "control_points.csv", sizes=(768, 576)).rig
     model, truth = read_body(folder / "cross.toml"), read_truth(folder / "truth.csv")
     on_body, rng = body_points(model, POINTS), np.random.default_rng(5)
-    with open_studio(folder) as address, open_page(address.replace("/?", "/digitise?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/digitise?")) as page:
         canvas = page.locator("canvas.view")
         for frame in FRAMES:
             while int(canvas.get_attribute("data-frame") or 0) < frame:
@@ -69,7 +69,7 @@ def test_a_click_belongs_to_the_frame_that_it_was_made_in(tmp_path):
             canvas.view["on_" + name](new PointerEvent(name, at));
         }
     }"""
-    with open_studio(folder) as address, open_page(address.replace("/?", "/digitise?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/digitise?")) as page:
         wait_for_frame(page, 0)
         page.wait_for_function("document.querySelector('canvas.view').view.underway.size == 0")  # the next are here
         page.evaluate("document.querySelector('canvas.view').setPointerCapture = () => {}")  # no pointer is down

@@ -9,7 +9,7 @@ from airborne.studio.outlines import legs_items
 from airborne.studio.trial_edits import with_players
 from airborne.trial.file import read_trial
 from tests.studio.test_click_players import LEGS, TRIAL, folder, rig  # noqa: F401
-from tests.support.studio import User, open_page, open_studio, wait_for_frame
+from tests.support.studio import User, fork_studio, open_page, wait_for_frame
 
 
 def test_the_players_of_an_answer_are_those_of_the_trial(rig, folder):  # noqa: F811
@@ -32,7 +32,7 @@ def test_legs_are_lines_down_each_side_in_every_camera(rig):  # noqa: F811
 
 def test_where_nobody_stands_the_studio_says_so_and_clicks_are_a_button_away(rig, folder):  # noqa: F811
     (folder / "trial.toml").write_text(TRIAL + 'body = { preset = "legs" }\n')
-    with open_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
         user = User(page)
         wait_for_frame(page, 0)
         user.press("Let it be found")

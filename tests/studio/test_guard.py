@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import open_studio
+from tests.support.studio import fork_studio
 
 SECRET = "only its owner may read this"
 N_CRAFTED = 200
@@ -31,7 +31,7 @@ def studio(tmp_path_factory):
     (folder / "results" / "link").symlink_to(outside)
     (folder / "escape").symlink_to(outside)
     (folder / "link.mp4").symlink_to(outside / "secret.mp4")
-    with open_studio(folder) as address:
+    with fork_studio(folder) as address:
         yield urlsplit(address)
 
 

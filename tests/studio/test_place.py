@@ -9,7 +9,7 @@ from airborne.studio.place import LastView, read_place, write_place
 from airborne.studio.session import Session
 from airborne.studio.writing import FOLDER
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import open_studio
+from tests.support.studio import fork_studio
 from tests.support.studio_edits import edits_found, kill_while_editing
 
 N_KILLS = 2  # more: benchmarks/kills.py studio
@@ -43,8 +43,8 @@ def test_no_edit_is_lost_when_the_studio_is_killed(tmp_path):
 
 def test_the_address_that_is_printed_is_the_page_that_was_open(tmp_path):
     write_place(tmp_path, LastView("/videos/../etc", 3))
-    with open_studio(tmp_path) as address:
+    with fork_studio(tmp_path) as address:
         assert "/?token=" in address
     write_place(tmp_path, LastView("/review", 3))
-    with open_studio(tmp_path) as address:
+    with fork_studio(tmp_path) as address:
         assert "/review?token=" in address

@@ -8,7 +8,7 @@ import pytest
 from airborne.cameras import Rig, camera_looking_at
 from airborne.video import VideoWriter
 from tests.support.person_run import write_person_run
-from tests.support.studio import MINUTE, open_page, open_studio
+from tests.support.studio import MINUTE, fork_studio, open_page
 
 SIZE, N, RATE = (320, 240), 12, Fraction(50)
 
@@ -29,7 +29,7 @@ def folder(tmp_path_factory):
 
 
 def test_a_film_and_an_export_are_made_and_linked(folder):
-    with open_studio(folder) as address, open_page(address.replace("/?", "/results?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/results?")) as page:
         page.get_by_role("button", name="Export").click()
         page.get_by_text("results.c3d").wait_for(timeout=2 * MINUTE)
         page.get_by_label("first frame").fill("3")

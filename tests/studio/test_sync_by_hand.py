@@ -6,7 +6,7 @@ import pytest
 
 from airborne.io.text import read_toml
 from tests.support.clips import write_clip
-from tests.support.studio import burn_numbers, open_page, open_studio
+from tests.support.studio import burn_numbers, fork_studio, open_page
 
 RATES, N = {"first": Fraction(25), "second": Fraction(50)}, 40
 EVENTS = ((10, 30), (20, 50))  # pictures of each
@@ -42,7 +42,7 @@ def step_to(page, side, picture):
 
 
 def test_two_events_give_the_offset_and_its_deviation(folder):
-    with open_studio(folder) as address, open_page(address.replace("/?", "/sync?")) as page:
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/sync?")) as page:
         page.locator("canvas.view").nth(1).wait_for()
         for first, second in EVENTS:
             step_to(page, 0, first)

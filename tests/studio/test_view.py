@@ -8,7 +8,7 @@ from airborne.studio.clicks import read_clicked
 from airborne.video import VideoSource, VideoWriter, weave
 from airborne.video.seeking import index_images
 from tests.support.clips import write_clip
-from tests.support.studio import at_pixel, burn_numbers, go_home, open_page, open_studio, read_number, wait_for_frame
+from tests.support.studio import at_pixel, burn_numbers, fork_studio, go_home, open_page, read_number, wait_for_frame
 
 N = 60
 IRREGULAR = [40 * k + (k * k) % 19 for k in range(N)]  # ms
@@ -51,7 +51,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(folder):
-    with open_studio(folder) as address:
+    with fork_studio(folder) as address:
         yield address.replace("/?", "/cameras?")
 
 

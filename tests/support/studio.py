@@ -1,5 +1,6 @@
 """The studio as a process, and a browser that looks at it, or at a report."""
 
+import multiprocessing
 import os
 import re
 import shutil
@@ -7,12 +8,19 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
 
+from airborne.cli import main
+
 RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
+_FORKS = multiprocessing.get_context("forkserver")
+_FORKS.set_forkserver_preload(["airborne.cli", "airborne.studio.server"])
+_NAME = "MainProcess"  # of a process in which NiceGUI serves
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SIZE = {"width": 1280, "height": 720}
 MINUTE = 60_000  # ms
@@ -28,14 +36,45 @@ def open_studio(path: Path, *options: str) -> Iterator[str]:
     env = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}  # NiceGUI looks at it
     with subprocess.Popen(command, cwd=path.parent, env=env, **pipes) as process:
         try:
-            line = process.stdout.readline()
-            found = re.search(r"http://\S+", line)
-            assert found, line + process.stderr.read()
-            yield found.group(0)
+            yield _address(process.stdout, process.stderr)
         finally:
             process.terminate()
             said = process.communicate(timeout=30)[1]
     assert "Traceback" not in said, said
+
+
+@contextmanager
+def fork_studio(path: Path, *options: str) -> Iterator[str]:
+    """Do what `open_studio` does, in a fifth of its time: in a fork of a process that has imported everything."""
+    (ours, out), (ours_of_errors, errors) = (_FORKS.Pipe(duplex=False) for _ in range(2))
+    words = ("studio", str(path), "--no-browser", *options)
+    process = _FORKS.Process(target=_run_command, args=(words, path.parent, out, errors), name=_NAME)
+    process.start()
+    out.close(), errors.close()
+    with open(ours.fileno(), closefd=False) as printed, open(ours_of_errors.fileno(), closefd=False) as complained:
+        try:
+            yield _address(printed, complained)
+        finally:
+            process.terminate()
+            said = complained.read()
+            process.join(timeout=30)
+    assert "Traceback" not in said, said
+
+
+def _address(printed: IO[str], complained: IO[str]) -> str:
+    line = printed.readline()
+    found = re.search(r"http://\S+", line)
+    assert found, line + complained.read()
+    return found.group(0)
+
+
+def _run_command(words: tuple[str, ...], folder: Path, out: Connection, errors: Connection) -> None:
+    for number, pipe in enumerate((out, errors), start=1):
+        os.dup2(pipe.fileno(), number)
+    os.chdir(folder)
+    os.environ.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI looks at it
+    sys.argv = ["airborne", *words]
+    main()
 
 
 @contextmanager
