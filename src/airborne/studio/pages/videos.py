@@ -44,6 +44,7 @@ async def videos_page(session: Session) -> None:
         project = session.project()
         if project.mistake:
             ui.label(project.mistake).classes("bad")
+            ui.label(f"Open {session.path.name} in a text editor and correct it, then reload this page.")
         order = [camera.video for camera in project.cameras]  # the trial's, as its first camera is the clock
         files = list_videos(session.folder)
         files.sort(key=lambda path: order.index(path.name) if path.name in order else len(order))
@@ -61,7 +62,8 @@ async def videos_page(session: Session) -> None:
                 choices.append(_choose(project, path, facts))
                 _card(choices[-1], facts)
         with ui.element("div").classes("row-line"):
-            ui.button("Use these cameras", on_click=lambda: _save(session, choices)).props("unelevated")
+            use = ui.button("Use these cameras", on_click=lambda: _save(session, choices)).props("unelevated")
+            use.set_enabled(project.mistake is None)
             ui.label(f"writes {session.path.name}").classes("soft small")
             if len(project.cameras) > 1:
                 with ui.element("a").props('href="/sync"').classes("plain"):
@@ -72,7 +74,7 @@ def _facts(path: Path) -> VideoFacts | str:
     try:
         return inspect(VideoSource(path.name, path))
     except AirborneError as error:
-        return str(error)
+        return str(error).removeprefix(f"{path.name}: ").replace(str(path), "this file")
 
 
 def _choose(project: Project, path: Path, facts: VideoFacts | str) -> _Choice:
