@@ -216,7 +216,8 @@ class DigitisePanel(PointsPanel):
         path = self.session.folder / self.file
         if self.model is not None and self.model.has_joints:
             paths = path.with_name(f"{path.stem}_joints.csv")
-            self.session.edit(paths.name, joint_paths_text(self.table, self.session.rig(), run_rows(run)), "joints")
+            text = joint_paths_text(self.table, self.session.rig(), run_rows(run))
+            self.session.edit(paths.name, text, "paths of the clicked joints")
             return assess(run, None, None, paths)["joints"].describe()
         return assess(run, None, path)["digitised"].describe()
 
