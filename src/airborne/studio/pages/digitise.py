@@ -128,7 +128,7 @@ class DigitisePanel(PointsPanel):
         with ui.element("div").classes("row-line"):
             name = ui.input("another point").props("dense outlined").style("width: 130px")
             ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
-            ui.button("Take back", on_click=self.remove).props("flat dense").tooltip("the chosen click")
+            ui.button("Remove", on_click=self.remove).props("flat dense").tooltip("the chosen click")
 
     def _build_comparison(self) -> None:
         runs = [run for run in list_runs(self.session.folder) if not holds_players(run)]

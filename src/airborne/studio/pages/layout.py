@@ -17,6 +17,7 @@ from airborne.studio.session import Session
 _T = TypeVar("_T")
 _LOOK_EVERY_S = 1.0  # for changes by other windows and other programs
 _BLUE = "#0072b2"  # of buttons: dark enough for white letters
+_GREEN = "#007a5a"  # of good news, likewise
 _KEYS = {
     "← →": "one frame back or on; with Shift ten",
     ", .": "one frame back or on, also while a point is chosen",
@@ -51,7 +52,7 @@ async def page_frame(
     What stands in it is built once the window is there, so that it may take its time.
     """
     changed: list[Callable[[], Awaitable[None]]] = []
-    ui.colors(primary=_BLUE)
+    ui.colors(primary=_BLUE, positive=_GREEN)
     sheet, example, known = _sheet(), _example(here), [session.stamp]
 
     async def move(verb: str) -> None:

@@ -97,7 +97,7 @@ def _card(choice: _Choice, facts: VideoFacts | str) -> None:
         picture = ui.element("img").props(f"src=/thumbnail/{quote(choice.video)}")
         picture._props["alt"] = f"first picture of {choice.video}"  # a file's name may hold quotes
         ui.checkbox(choice.video).bind_value(choice, "is_camera").props("dense")
-        ui.label(_describe(facts)).classes("soft small")
+        ui.label().classes("soft small").bind_text_from(choice, "fields", lambda fields: _describe(facts, fields))
         ui.input("name of the camera").bind_value(choice, "name").props("dense outlined")
         fields = ui.select(_FIELDS, label="pictures are").bind_value(choice, "fields")
         fields.props("dense outlined options-dense")
@@ -122,9 +122,10 @@ def _show_orders(choice: _Choice) -> None:
                 ui.label(_FIELDS[order].removeprefix("two fields, ")).classes("small")
 
 
-def _describe(facts: VideoFacts) -> str:
+def _describe(facts: VideoFacts, fields: str) -> str:
     length = "" if facts.duration_s is None else f", {float(facts.duration_s):.1f} s"
-    return f"{facts.size[0]}×{facts.size[1]} px, {float(facts.frame_rate):.5g} pictures/s{length}"
+    halves = "" if fields == "progressive" else f" = {2 * float(facts.frame_rate):.5g} fields/s"
+    return f"{facts.size[0]}×{facts.size[1]} px, {float(facts.frame_rate):.5g} pictures/s{halves}{length}"
 
 
 def _save(session: Session, choices: list[_Choice]) -> None:
