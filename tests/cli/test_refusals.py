@@ -5,8 +5,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+import typer
 
-from tests.support.commands import refusal
+from airborne.cli import app
+from tests.support.commands import in_process, refusal
 from tests.support.example_trial import CALIBRATED, SHORT, edit_trial
 
 BROKEN_TRIALS = {  # what is replaced in trial.toml, and what the line says
@@ -133,3 +135,24 @@ def test_a_folder_that_may_not_be_written_is_named_and_another_suggested(tmp_pat
     monkeypatch.setattr("airborne.run.bench.measure_speed", forbidden)
     said = f"airborne: {tmp_path} cannot be written (Permission denied); give another folder with -o\n"
     assert refusal(capsys, "bench") == said
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["studo"], "No such command 'studo'. Did you mean 'studio'? See "),
+        (["check", "--jsn"], "No such option: --jsn. Did you mean --json? See "),
+        (["calibrate", "a.csv"], "Missing option '-o' / '--output': Calibration file to write"),
+        (["check", "."], "(it is a folder); give the path of a trial's TOML file"),
+    ],
+)
+def test_a_wrong_or_missing_word_is_answered_by_what_may_be_meant(capsys, words, says):
+    assert says in refusal(capsys, *words)
+
+
+def test_the_help_names_each_command_once_below_a_step_of_the_work(capsys):
+    assert in_process("--help") == 0
+    lines = capsys.readouterr().out.splitlines()
+    named = [line.split()[0] for line in lines if line.startswith("  ") and not line.startswith((" " * 4, "  -"))]
+    assert sorted(named[1:]) == sorted(vars(typer.main.get_command(app))["commands"])
+    assert lines.index("Cameras:") < lines.index("Track:") < lines.index("Results:")

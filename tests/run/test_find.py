@@ -127,3 +127,10 @@ def test_frame_writes_the_pixels_to_click_in(path, tmp_path, monkeypatch):
 
 def test_undecided_is_an_error_of_the_trial():
     assert issubclass(UndecidedError, TrialError)
+
+
+@pytest.mark.parametrize(
+    ("probability", "says"), [(0.6, "probability 60%"), (0.984, "probability 98%"), (1.0, "probability over 99%")]
+)
+def test_no_start_is_said_to_be_certain(probability, says):
+    assert find.describe_probability(probability) == says

@@ -92,10 +92,10 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         page.mouse.up()
         page.get_by_text(f"{name} corrected in {rig.names[CAMERA]}, frame {FRAME}").first.wait_for()
         again = page.get_by_role("button", name="Track again around it")
-        page.keyboard.press("Control+z")
+        page.get_by_label("frame in view").press("Control+z")  # heard there too
         again.wait_for(state="hidden")  # nothing is left of it
         wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", u)
-        page.keyboard.press("Control+y")
+        page.get_by_label("all frames").press("Control+y")
         page.get_by_text("the corrections have changed").wait_for()
         wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", u + DRAGGED_PX[0])
         page.locator("canvas.view").press(".")

@@ -8,6 +8,7 @@ import pytest
 from airborne.studio.place import LastView, read_place, write_place
 from airborne.studio.session import Session
 from airborne.studio.writing import FOLDER
+from tests.support.commands import refusal
 from tests.support.places import THROWN_CROSS
 from tests.support.studio import fork_studio
 from tests.support.studio_edits import edits_found, kill_while_editing
@@ -48,3 +49,14 @@ def test_the_address_that_is_printed_is_the_page_that_was_open(tmp_path):
     write_place(tmp_path, LastView("/review", 3))
     with fork_studio(tmp_path) as address:
         assert "/review?token=" in address
+
+
+def test_a_folder_is_open_in_one_studio_at_a_time(tmp_path, capsys):
+    (folder := tmp_path / "A").mkdir()
+    with open_studio(folder) as address:
+        says = refusal(capsys, "studio", folder, "--no-browser")
+    assert "is open in another studio (process " in says
+    assert address.partition("?")[0].rstrip("/") in says
+    assert "token" not in says
+    with open_studio(folder):
+        pass

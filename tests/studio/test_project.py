@@ -43,9 +43,24 @@ def test_what_is_missing_is_said(tmp_path):
     assert said["Cameras"] == "click points in cam1, cam2, cam3"
 
 
-def test_a_trial_that_cannot_be_read_says_why(tmp_path):
-    (tmp_path / "trial.toml").write_text("[[camera]]\nname = 3\n")
-    assert read_project(tmp_path, tmp_path / "trial.toml").mistake is not None
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[[camera]]\nname = 3\n", "trial.toml: camera 1: name: expected a valid string"),
+        ('[[camera]]\nname = "a"\nvideo = "a.mp4"\nfield = "x"\n', "did you mean fields?"),
+        ("camera = 3", "expected [[camera]] tables (found 3)"),
+        ("[[camera]\n", "(at line 1, column 9); correct it"),
+    ],
+)
+def test_a_trial_that_cannot_be_read_says_where_and_why(tmp_path, text, says):
+    (tmp_path / "trial.toml").write_text(text)
+    assert says in (read_project(tmp_path, tmp_path / "trial.toml").mistake or "")
+
+
+def test_a_video_is_no_folder(tmp_path):
+    (tmp_path / "cam1.mp4").write_bytes(b"0")
+    with pytest.raises(TrialError, match=r"cam1\.mp4 is a video; give its folder"):
+        find_trial(tmp_path / "cam1.mp4")
 
 
 def test_a_video_outside_the_folder_is_refused(tmp_path):

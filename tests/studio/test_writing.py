@@ -23,11 +23,11 @@ def test_edits_are_undone_and_done_again_in_their_order(editor, tmp_path):
     path = tmp_path / "trial.toml"
     editor.write("trial.toml", "a = 1\n", "first")
     editor.write("trial.toml", "a = 2\n", "second")
-    assert editor.undo() == "second"
+    assert editor.undo() == "second (trial.toml)"
     assert path.read_text() == "a = 1\n"
-    assert editor.undo() == "first"
+    assert editor.undo() == "first (trial.toml)"
     assert not path.exists()
-    assert (editor.redo(), editor.redo()) == ("first", "second")
+    assert (editor.redo(), editor.redo()) == ("first (trial.toml)", "second (trial.toml)")
     assert path.read_text() == "a = 2\n"
     with pytest.raises(TrialError, match="nothing to redo"):
         editor.redo()
@@ -37,7 +37,7 @@ def test_a_new_edit_ends_what_could_be_done_again(editor):
     editor.write("a.csv", "1", "first")
     editor.undo()
     editor.write("a.csv", "2", "other")
-    assert (editor.last, editor.next) == ("other", None)
+    assert (editor.last, editor.next) == ("other (a.csv)", None)
 
 
 def test_what_others_changed_since_is_not_undone(editor, tmp_path):

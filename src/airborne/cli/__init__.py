@@ -6,9 +6,10 @@ import errno
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from airborne import __version__
 from airborne.cli import reproduce, results, synth, track
@@ -28,26 +29,24 @@ from airborne.errors import STOPPED, UNDECIDED, AirborneError, UndecidedError
 
 _MOST_PIXELS = "150000000"  # of a picture that OpenCV decodes, as of a video's; a file may declare any number
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
-_COMMANDS = {
-    "demo": track.demo_command,
-    "studio": studio_command,
-    "check": check_command,
-    "find": find_command,
-    "frame": frame_command,
-    "track": track.track_command,
-    "new": new_command,
-    "batch": batch_command,
-    "compare": compare_command,
-    "calibrate": calibrate_command,
-    "sync": sync_command,
-    "convert": convert_command,
-    "fit-body": track.fit_body_command,
-    "smooth": smooth_command,
-    "evaluate": results.evaluate_command,
-    "export": export_command,
-    "film": film_command,
-    "bench": track.bench_command,
-    "warm": track.warm_command,
+_STEPS = {  # in the order of the work
+    "Begin": {"demo": track.demo_command, "studio": studio_command},
+    "Cameras": {"calibrate": calibrate_command, "sync": sync_command, "convert": convert_command},
+    "First pose": {
+        "check": check_command,
+        "find": find_command,
+        "frame": frame_command,
+        "fit-body": track.fit_body_command,
+    },
+    "Track": {"track": track.track_command, "new": new_command, "batch": batch_command},
+    "Results": {
+        "smooth": smooth_command,
+        "evaluate": results.evaluate_command,
+        "compare": compare_command,
+        "export": export_command,
+        "film": film_command,
+    },
+    "This machine": {"bench": track.bench_command, "warm": track.warm_command},
 }
 _SYNTH = {
     "cross": synth.synth_cross_command,
@@ -55,6 +54,20 @@ _SYNTH = {
     "block": synth.synth_block_command,
 }
 _REPRODUCE = {"rigid": reproduce.reproduce_rigid_command, "blockjump": reproduce.reproduce_blockjump_command}
+
+
+class _Steps(TyperGroup):
+    """The commands in the help under the steps of the work, and last the groups of commands."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a section for each step."""
+        groups = {name: None for name in self.commands if not any(name in step for step in _STEPS.values())}
+        width = max(map(len, self.commands))
+        for heading, names in {**_STEPS, "Research": groups}.items():
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [(f"{name:{width}}", self.commands[name].get_short_help_str(1000)) for name in names]
+                )
 
 
 def _group(commands: dict, text: str, **options: Any) -> typer.Typer:
@@ -65,8 +78,9 @@ def _group(commands: dict, text: str, **options: Any) -> typer.Typer:
 
 
 app = _group(
-    _COMMANDS,
+    {name: command for step in _STEPS.values() for name, command in step.items()},
     "Measure athletes in flight from ordinary multi-camera colour video.",
+    cls=_Steps,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
@@ -84,13 +98,7 @@ def main() -> None:
             stop()
         sys.exit(code)
     except _UsageError as error:
-        message, context = error.format_message(), getattr(error, "ctx", None)
-        if "Usage:" in message or not message:  # a command without arguments: its help
-            print(message, end="")
-            sys.exit(2)
-        message = message.replace("Value error, ", "").replace("Input should be", "expected a number")
-        command = context.command_path if context else "airborne"
-        refuse(f"{' '.join(message.split()).rstrip('.?')}; see {command} --help")
+        _refuse_usage(error)
     except (KeyboardInterrupt, typer.Abort):
         stop()
     except UndecidedError as error:
@@ -99,6 +107,21 @@ def main() -> None:
         refuse(str(error))
     except OSError as error:
         refuse(_describe_path_error(error))
+
+
+def _refuse_usage(error: Any) -> NoReturn:
+    """Say which word of the command line is wrong, and what is meant by it or missing; exit with code 2."""
+    message, context = error.format_message(), getattr(error, "ctx", None)
+    if "Usage:" in message or not message:  # a command without arguments: its help
+        print(message, end="")
+        sys.exit(2)
+    message = message.replace("Value error, ", "").replace("Input should be", "expected a number")
+    if possible := getattr(error, "possibilities", None):
+        message = f"{error.message}. Did you mean {' or '.join(possible)}?"
+    elif message.startswith("Missing") and (meaning := getattr(error.param, "help", None)):
+        message = f"{message.rstrip('.')}: {meaning}"
+    text, command = " ".join(message.split()).rstrip("."), context.command_path if context else "airborne"
+    refuse(f"{text} See {command} --help" if text.endswith("?") else f"{text}; see {command} --help")
 
 
 def _describe_path_error(error: OSError) -> str:

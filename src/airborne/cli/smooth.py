@@ -44,12 +44,14 @@ def smooth_command(
     from airborne.export.summary import json_ready
     from airborne.run.smooth import smooth_run
 
+    note = ""
     if butterworth is None and not (spline or kalman):
-        kalman = True
-        errors.print("smoothing with --kalman and the run's own covariances: no method was chosen", markup=False)
+        kalman, note = True, "smoothed with --kalman and the run's own covariances: no method was chosen"
     settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
         done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)
+    if note:
+        errors.print(note, markup=False)
     print(json.dumps(json_ready(done.to_dict())) if as_json else done.describe())
 
 

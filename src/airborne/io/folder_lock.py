@@ -19,14 +19,27 @@ except ImportError:  # Windows: nothing is locked there
 LOCK = "run.lock"  # without a process that holds it, the file means nothing
 
 
+class InUseError(ResultError):
+    """Another process writes into the folder; `holder` says which."""
+
+    def __init__(self, message: str, holder: str) -> None:
+        """Keep the holder, as it described itself."""
+        super().__init__(message)
+        self.holder = holder
+
+
 @contextmanager
-def sole_writer(folder: Path) -> Iterator[None]:
-    """Make a folder and be the only one that writes into it; raises ResultError where another process does."""
+def sole_writer(folder: Path, address: str = "") -> Iterator[None]:
+    """Make a folder and be the only one that writes into it; raises InUseError where another process does.
+
+    That one is told which process has it, since when, and the `address` where it is found.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     file = _lock(folder)
+    holder = f"process {os.getpid()} on {socket.gethostname()} since {datetime.now():%F %T}"
     try:
         os.ftruncate(file, 0)
-        os.write(file, f"process {os.getpid()} on {socket.gethostname()} since {datetime.now():%F %T}".encode())
+        os.write(file, f"{holder}, {address}".rstrip(", ").encode())
         yield
     finally:
         (folder / LOCK).unlink(missing_ok=True)
@@ -52,11 +65,12 @@ def _lock(folder: Path) -> int:
         os.close(file)
 
 
-def _refusal(folder: Path, holder: str) -> ResultError:
+def _refusal(folder: Path, holder: str) -> InUseError:
     elsewhere = "" if f" on {socket.gethostname()} " in holder else f"; if that machine is down, remove {LOCK}"
-    return ResultError(
+    return InUseError(
         f"{folder} is being written by another run ({holder or 'just started'}); wait for its end or stop it, "
-        f"or give another folder{elsewhere if holder else ''}"
+        f"or give another folder{elsewhere if holder else ''}",
+        holder,
     )
 
 

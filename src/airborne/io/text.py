@@ -28,6 +28,8 @@ _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # 
 def read_bytes(path: Path, most_bytes: int) -> bytes:
     """Read a file. Raises OSError, also for a pipe or a device, or ValueError where it is too large."""
     status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
+        raise OSError(errno.EISDIR, "it is a folder", str(path))
     if not stat.S_ISREG(status.st_mode):
         raise OSError(errno.EINVAL, "it is no file", str(path))
     if status.st_size > most_bytes:

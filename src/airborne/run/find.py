@@ -34,6 +34,7 @@ from airborne.video import Frames, Recording, VideoFacts, open_recording
 AnySearch = TypeVar("AnySearch", StartSearch, PlayersSearch)
 
 _MOST_IMAGES = 1500  # of each camera that are looked at
+_SURE = 0.99  # a higher probability rests on assumptions that are less sure themselves
 _MOST_BYTES = 4e8  # of decoded pictures that are kept to track back through
 
 
@@ -88,9 +89,14 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     frame, pose = _track_back(trial, model, recording, finding)
     note = (
         f"[start] was found: the body stands out best in frame {finding.moment.frames.index} "
-        f"(probability {first.probability:.3g}) and can be followed back to frame {frame}"
+        f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, note)
+
+
+def describe_probability(probability: float) -> str:
+    """Say how sure a finding is; none is said to be certain."""
+    return f"probability {probability:.0%}" if probability < _SURE else f"probability over {_SURE:.0%}"
 
 
 def look_through(trial: Trial, progress: Progress | None) -> tuple[Recording, tuple[VideoFacts, ...], list[Frames]]:

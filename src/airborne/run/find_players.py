@@ -11,7 +11,7 @@ from airborne.errors import TrialError, UndecidedError
 from airborne.export import write_json
 from airborne.export.finding import draw_player_candidates
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
-from airborne.run.find import frames_up_to, look_through, take_candidate
+from airborne.run.find import describe_probability, frames_up_to, look_through, take_candidate
 from airborne.run.folder import open_results
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
@@ -64,7 +64,7 @@ def find_players_start(
     frame, starts = _track_back(trial, recording, finding)
     note = (
         f"[[start.player]] were found: {len(starts)} stand out best in frame {finding.frames.index} "
-        f"(probability {first.probability:.3g}) and can be followed back to frame {frame}"
+        f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     return FoundPlayers(_with_start(trial, frame, starts), finding, facts, note)
 

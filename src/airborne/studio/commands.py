@@ -65,11 +65,11 @@ class Command:
 
     def complaint(self) -> str:
         """Return the last line of an ended command's errors."""
-        return self.progress().removeprefix("airborne: ") or f"it ended with the code {self.code}"
+        return self.progress() or f"it ended with the code {self.code}"
 
     def progress(self) -> str:
         """Return the last line of what it says beside its output."""
-        return self._log.read_text(errors="replace").strip().rpartition("\n")[2]
+        return self._log.read_text(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
 
     def stop(self) -> None:
         """Stop it as Ctrl-C does, and wait for its end."""

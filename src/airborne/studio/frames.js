@@ -4,9 +4,9 @@ const LONGEST_MS = 200; // between frames: over a gap of the recording, playing 
 export default {
   template: `<div class="frames">
     <button type="button" :aria-label="playing ? 'stop' : 'play'" @click="toggle">{{ playing ? "❚❚" : "▶" }}</button>
-    <input type="range" min="0" :max="n_frames - 1" :value="frame" aria-label="all frames" @input="go($event.target.value)">
-    <input type="number" min="0" :max="n_frames - 1" :value="frame" aria-label="frame in view" @change="go($event.target.value)">
-    <span>of {{ n_frames - 1 }}{{ time_s === null ? "" : ", " + time_s.toFixed(3) + " s" }}</span>
+    <input type="range" min="0" :max="n_frames - 1" :value="frame" aria-label="all frames" @input="go($event.target.value)" @keydown="leave">
+    <input type="number" min="0" :max="n_frames - 1" :value="frame" aria-label="frame in view" @change="go($event.target.value)" @keydown="leave">
+    <span>of 0 to {{ n_frames - 1 }}{{ time_s === null ? "" : ", " + time_s.toFixed(3) + " s" }}</span>
   </div>`,
   props: { view: Number, n_frames: Number, start: Number },
   data() { return { frame: this.start, time_s: null, playing: false }; },
@@ -27,6 +27,9 @@ export default {
       const period = this.time_s === null || time_s === null ? LONGEST_MS / 4 : Math.min(LONGEST_MS, 1000 * Math.abs(time_s - this.time_s));
       [this.frame, this.time_s] = [frame, time_s];
       if (this.playing) this.playOn(period - (performance.now() - this.begun));
+    },
+    leave(event) { // keys of the whole page are heard where nothing is typed
+      if (event.key === "?" || (event.ctrlKey && "zy".includes(event.key))) getElement(this.view).canvas.focus();
     },
     toggle() {
       this.playing = !this.playing;

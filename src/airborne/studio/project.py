@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from airborne.body import BodyModel, read_measurements
 from airborne.body.files import read_body
-from airborne.errors import AirborneError, TrialError
+from airborne.errors import AirborneError, TrialError, one_line
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
 from airborne.studio.clicks import count_clicked, read_clicked
 from airborne.studio.writing import FOLDER
@@ -78,16 +78,28 @@ def read_project(folder: Path, path: Path) -> Project:
         tables, base = read_tables(path)
         if base != path.parent:
             raise TrialError(f"{path.name}: its session is in another folder; put the trial beside it")
-        cameras = tables.get("camera", [])
-        return Project(folder, path, tables, tuple(CameraTable(**table) for table in cameras), None)
-    except (AirborneError, ValidationError, TypeError) as error:
-        return Project(folder, path, {}, (), str(error).splitlines()[0])
+        return Project(folder, path, tables, tuple(_read_cameras(tables, path.name)), None)
+    except AirborneError as error:
+        return Project(folder, path, {}, (), str(error))
+
+
+def _read_cameras(tables: Mapping[str, Any], name: str) -> Iterator[CameraTable]:
+    cameras = tables.get("camera", [])
+    if not isinstance(cameras, list) or not all(isinstance(table, dict) for table in cameras):
+        raise TrialError(f"{name}: camera: expected [[camera]] tables (found {cameras!r:.40})")
+    for number, table in enumerate(cameras, start=1):
+        try:
+            yield CameraTable(**table)
+        except ValidationError as error:
+            raise TrialError(f"{name}: camera {number}: {one_line(error, table, CameraTable)}") from None
 
 
 def find_trial(path: Path) -> tuple[Path, Path]:
     """Return the folder and the trial's file that a path means; raises TrialError."""
     path = path.absolute()
     if path.is_file():
+        if path.suffix.lower() in VIDEO_ENDINGS:
+            raise TrialError(f"{path.name} is a video; give its folder: {path.parent}")
         read_tables(path)
         return path.parent, path
     if not path.is_dir():

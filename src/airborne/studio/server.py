@@ -16,7 +16,8 @@ from threading import Thread
 from nicegui import app, binding, ui
 from nicegui.server import Server
 
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, TrialError
+from airborne.io.folder_lock import InUseError, sole_writer
 from airborne.studio.curve_data import run_curves
 from airborne.studio.guard import Guard
 from airborne.studio.pages.body import body_page
@@ -33,6 +34,7 @@ from airborne.studio.pages.videos import videos_page
 from airborne.studio.project import find_trial, list_runs
 from airborne.studio.routes import add_routes
 from airborne.studio.session import Session
+from airborne.studio.writing import FOLDER
 
 _HOST = "127.0.0.1"
 _SOON_S = 0.05  # between looks whether the server listens
@@ -54,9 +56,23 @@ _PAGES = {
 
 
 def serve(path: Path, *, port: int, browser: bool, is_guided: bool) -> None:
-    """Serve a folder, or one of its trials, until the process is stopped. Raises AirborneError."""
-    session = Session(*find_trial(path), is_guided=is_guided)
-    port, token = _free_port(port), secrets.token_urlsafe(24)
+    """Serve a folder, or one of its trials, until the process is stopped. Raises AirborneError.
+
+    A folder that another studio has open is refused: what one undoes, the other would not know.
+    """
+    session, port = Session(*find_trial(path), is_guided=is_guided), _free_port(port)
+    try:
+        with sole_writer(session.folder / FOLDER, f"http://{_HOST}:{port}"):
+            _serve(session, port, browser=browser)
+    except InUseError as error:
+        raise TrialError(
+            f"{session.folder} is open in another studio ({error.holder or 'just started'}); go on in its window, "
+            "or end it first"
+        ) from None
+
+
+def _serve(session: Session, port: int, *, browser: bool) -> None:
+    token = secrets.token_urlsafe(24)
     here = session.place.page if session.place.page in _PAGES else "/"
     address = f"http://{_HOST}:{port}{here}?token={token}"
     for url, build in _PAGES.items():

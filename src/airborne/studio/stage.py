@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Awaitable, Callable, Iterable
 from itertools import pairwise
 
@@ -25,6 +26,7 @@ from airborne.types import Array
 _CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
 FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
 _ALL_IN_VIEW = 1.4  # times a sphere's radius: from so far, along `FROM`, three.js's 75 degrees hold it with a margin
+_FLOOR = 2.0  # times `away_m`: how far the floor's squares of a metre reach; further away they would be one stripe
 _MOST_LINES = 500  # of a path: each is an object of the scene
 _MOVE_EVERY_S = 0.05  # while handles are dragged: the outlines of three views take half of it
 _POINT_M = 0.03  # radius of a point in a scene
@@ -32,18 +34,14 @@ _SHAFT_M, _HEAD_M = 0.012, 0.12  # an arrow's thickness, and the length of its h
 _FRUSTUM_SHARE = 0.12  # of the distance between camera and middle
 
 
-def draw_cameras(
-    rig: Rig, path: Array | None = None, *, middle: Array | None = None, away_m: float | None = None
-) -> Scene:
-    """Show cameras and a path (n, 3) [m], NaN leaves gaps; seen from `away_m` beside the `middle` (3,) [m].
+def draw_cameras(rig: Rig, path: Array | None = None, *, seen_from: tuple[Array, float] | None = None) -> Scene:
+    """Show cameras and a path (n, 3) [m], NaN leaves gaps; `seen_from` is an overview.
 
-    Without these it shows all cameras and what they look at.
+    Without one it shows all cameras and what they look at.
     """
     centres, looked_at = np.stack([camera.centre for camera in rig]), middle_of_view(rig)
     reach = float(np.median(np.linalg.norm(centres - looked_at, axis=1)))
-    if middle is None or away_m is None:
-        middle, away_m = overview(np.vstack([centres, looked_at]))
-    with _scene(middle, away_m) as scene:
+    with _scene(*(seen_from or overview(np.vstack([centres, looked_at])))) as scene:
         for camera in rig:
             _frustum(scene, camera, _FRUSTUM_SHARE * reach)
         if path is not None:
@@ -62,16 +60,27 @@ def draw_rays(scene: Scene, camera: Camera, points: Array, colour: str) -> None:
 
 def draw_body(model: BodyModel, address: str) -> None:
     """Show a body in its zero pose, without a floor; `address` gives the mesh of each part, with {part} in it."""
-    pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.zeros((model.n_joints, 3)))
-    corners = bounding_points(model.with_pose(pose), cached_surface_arrays(model))
+    pose, corners = _zero_pose(model)
     lift = np.array([0.0, 0.0, -corners[:, 2].min()])
     pose, (middle, away_m) = pose.move(lift, np.zeros(3)), overview(corners + lift)
     BodyOnStage(_scene(middle, away_m, has_floor=False), model, address).show(pose)
 
 
+def reach_of(model: BodyModel) -> float:
+    """Return how far a body reaches from its root in its zero pose [m]."""
+    return float(np.linalg.norm(_zero_pose(model)[1], axis=1).max())
+
+
+def _zero_pose(model: BodyModel) -> tuple[Pose, Array]:
+    """Return a body's zero pose, and points (n, 3) [m] that hold all of it."""
+    pose = Pose(world_from_root=RigidTransform.identity(), joint_angles=np.zeros((model.n_joints, 3)))
+    return pose, bounding_points(model.with_pose(pose), cached_surface_arrays(model))
+
+
 def _scene(middle: Array, away_m: float, *, has_floor: bool = True) -> Scene:
     """Build an empty scene that is seen from `away_m` beside its middle (3,) [m]."""
-    scene = ui.scene(grid=(60, 60) if has_floor else False, background_color="#f6f7f8").style(
+    floor_m = 2 * math.ceil(np.linalg.norm(middle[:2]) + _FLOOR * away_m)  # about the origin
+    scene = ui.scene(grid=(floor_m, floor_m) if has_floor else False, background_color="#f6f7f8").style(
         "width: 100%; flex: 1; min-height: 180px"
     )
     with scene:

@@ -24,6 +24,11 @@ class Edit:
     before: str | None  # None: there was no file
     after: str | None
 
+    @property
+    def says(self) -> str:
+        """What it was for, and in which file: an undo may reach what another page did."""
+        return f"{self.what} ({self.path.name})"
+
 
 class Editor:
     """Writes the files of one folder and remembers its edits, to undo and redo them."""
@@ -47,12 +52,12 @@ class Editor:
     @property
     def last(self) -> str | None:
         """What `undo` would undo."""
-        return self._done[-1].what if self._done else None
+        return self._done[-1].says if self._done else None
 
     @property
     def next(self) -> str | None:
         """What `redo` would do again."""
-        return self._undone[-1].what if self._undone else None
+        return self._undone[-1].says if self._undone else None
 
     def undo(self) -> str:
         """Take the last edit back; return what it was."""
@@ -71,7 +76,7 @@ class Editor:
             raise TrialError(f"{edit.path.name} was changed elsewhere since; its earlier versions are in {FOLDER}")
         self._replace(edit.path, text)
         target.append(source.pop())
-        return edit.what
+        return edit.says
 
     def _replace(self, path: Path, text: str | None) -> None:
         if not path.resolve().is_relative_to(self.folder.resolve()) or path.is_symlink():

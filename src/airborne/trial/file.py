@@ -223,7 +223,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
     except tomllib.TOMLDecodeError as error:
-        raise TrialError(f"{path.name}: not a TOML file: {error}; expected a trial's TOML") from error
+        raise TrialError(f"{path.name}: not a TOML file: {error}; correct it, or give a trial's TOML file") from error
 
 
 def read_trial(

@@ -12,7 +12,7 @@ from typing import IO, Any
 
 import av
 from av.container import InputContainer
-from av.error import FFmpegError
+from av.error import FFmpegError, InvalidDataError
 from av.video.stream import VideoStream
 
 from airborne.errors import VideoError
@@ -41,9 +41,10 @@ def open_file(name: str, path: Path | str) -> InputContainer:
     try:
         return _open(f"file:{path.absolute()}", protocols="file")
     except (FFmpegError, OSError, ValueError) as error:
+        why = "" if isinstance(error, InvalidDataError) else f" ({getattr(error, 'strerror', None) or error})"
         raise VideoError(
-            f"{name}: {path} cannot be opened as a video ({getattr(error, 'strerror', None) or error}); "
-            "it is of another kind or was cut off; copy or convert it again"
+            f"{name}: {path} cannot be opened as a video{why}; it is of another kind or was cut off; "
+            "copy or convert it again"
         ) from error
 
 

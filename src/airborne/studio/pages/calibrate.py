@@ -35,13 +35,13 @@ from airborne.studio.session import Session
 _BOARD = "board.toml"  # of a new one
 _HELP = (
     "Each camera films the board close by, in every corner of its picture and tilted; then two cameras at once, until "
-    "all are linked. Or wave a wand, two balls unlike all else on a dark stick: it is found by itself. In the pictures "
-    "below, points should cover each camera's image, and arrows point in all directions."
+    "all are linked. Or wave a wand, two balls unlike all else on a dark stick: it is found by itself."
 )
+_PICTURES_HELP = "Points should cover each camera's image, and their arrows should point in all directions."
 _FILMED = "found in the videos"  # of a wand, instead of its table
 _WAND_HELP = (
-    "The ends of a wand that is not found can be clicked in some twenty frames, in the step Digitise; or put the table "
-    "of its markers here that DLTdv, easyWand or Argus tracked (…xypts.csv)."
+    "If the wand is not found, click its two ends in some twenty frames in the step Digitise. Or track them in DLTdv, "
+    "easyWand or Argus, and put that table (…xypts.csv) beside the videos."
 )
 
 
@@ -61,22 +61,27 @@ class CalibratePanel:
             ui.html("<h2>Calibrate with a board or a wand</h2>", sanitize=False)
             ui.label(_HELP).classes("help small")
             with ui.element("div").classes("row-line"):
+                self._video_choices()
+            ui.html("<h2>A board</h2>", sanitize=False)
+            with ui.element("div").classes("row-line"):
                 self.board = ui.select(boards, label="board", value=boards[0] if boards else None)
                 self.board.props("outlined dense options-dense").style("min-width: 180px")
-                self._video_choices()
-            self._board_form()
-            with ui.element("div").classes("row-line"):
                 board = ui.button("Calibrate with the board", on_click=self.use_board).props("unelevated")
+            self._board_form()
+            ui.html("<h2>A wand</h2>", sanitize=False)
+            with ui.element("div").classes("row-line"):
                 self.wand = ui.select([*wands, _FILMED], label="wand", value=[*wands, _FILMED][0])
                 self.wand.props("outlined dense options-dense").style("min-width: 180px")
                 self.length = ui.number("its length [m]", min=0.05, max=10, value=0.5, step=0.001)
                 self.length.props("outlined dense").style("width: 120px")
                 wand = ui.button("Calibrate with the wand", on_click=self.use_wand).props("unelevated")
+            ui.label(_WAND_HELP).classes("soft small").style("white-space: normal")
+            with ui.element("div").classes("row-line"):
                 self.watch = CommandWatch(self.session, "calibrate", self.take, words="calibrating")
                 self.watch.buttons = [board, wand]
-            ui.label(_WAND_HELP).classes("soft small")
             self.results = ui.refreshable(self._show_results)
             self.results()
+            ui.button("Close", on_click=dialog.close).props("flat")
         dialog.on("hide", lambda: ui.navigate.reload() if self.is_new else None)
         ui.button("With a board or a wand", on_click=dialog.open).props("outline")
 
@@ -156,8 +161,10 @@ class CalibratePanel:
         with errors_shown():
             findings = read_findings(self.session.folder, CALIBRATED)
             show_findings(findings.get("", []))
+            if pictures := list_pictures(self.session.folder):
+                ui.label(_PICTURES_HELP).classes("soft small")
             with ui.element("div").classes("files"):
-                for path in list_pictures(self.session.folder):
+                for path in pictures:
                     camera = path.stem.removeprefix("residuals_")
                     with ui.element("div"):
                         address = f"/calibration/{quote(path.name)}?{path.stat().st_mtime_ns}"

@@ -71,7 +71,7 @@ class PlayersPanel(PointsPanel):
                         ui.button("Add", on_click=self.add).props("outline")
                     self.note = ui.label().classes("small")
                     self.use = ui.button("Use these players", on_click=self.write).props("unelevated")
-                    ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
                 self.list = PointList(self.shown.names, self.choose)
         await self.reread()
 

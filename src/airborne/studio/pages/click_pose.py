@@ -74,7 +74,7 @@ class ClickPanel(PointsPanel):
                 with ui.element("div").classes("card"):
                     self.note = ui.label().classes("small")
                     self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
-                    ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
                     ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                     FitButton(self.session, self.hand, lambda: self.frame, self.take_pose)
                     self.stage = PoseStage(self.rig, self.hand, self.take_pose)

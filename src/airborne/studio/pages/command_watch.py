@@ -82,6 +82,7 @@ class CommandWatch:
         for button in self.buttons:
             button.set_enabled(not is_running)
         if command is not None and is_running:
-            self.says.set_text(", ".join(filter(None, [self._words, command.progress(), f"{command.seconds:.0f} s"])))
+            line = command.progress().removeprefix(f"{self._words}: ")
+            self.says.set_text(f"{self._words}, {command.seconds:.0f} s{': ' if line else ''}{line}")
         elif command is not self._ended:
             self.says.set_text("")

@@ -78,7 +78,7 @@ class ControlPointsPanel(PointsPanel):
                 self.state = ui.refreshable(self._list_state)
                 with ui.element("div").classes("card"):
                     self.state()
-                    ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
                     ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
                     self.scene = ui.element("div").style("height: 260px; display: flex")
                     self.scene.set_visibility(False)

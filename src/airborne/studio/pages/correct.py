@@ -42,15 +42,19 @@ class Correction:
         self._seen = self._tracked = self._held()  # when this window looked last; when it last tracked
 
     def build(self) -> None:
-        """Lay out the switch, the button that tracks again, and what there is to say."""
+        """Lay out the switch, and what leaves a camera out."""
         with ui.element("div").classes("row-line"):
             self.switch = ui.switch("Correct", on_change=lambda: self.turn_to(self.session.frame))
+        self.masks = MaskPanel(self.session, self.shown, self._note_change)
+        self.masks.area.bind_visibility_from(self.switch, "value")
+
+    def build_watch(self) -> None:
+        """Lay out the button that tracks again, and what there is to say: where the pictures do not shrink for it."""
+        with ui.element("div").classes("row-line"):
             self.again = ui.button("Track again around it", on_click=self.track).props("unelevated")
             self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking")
             self.watch.buttons = [self.again]
         self.again.set_visibility(False)
-        self.masks = MaskPanel(self.session, self.shown, self._note_change)
-        self.masks.area.bind_visibility_from(self.switch, "value")
 
     def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""

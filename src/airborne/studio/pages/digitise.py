@@ -128,7 +128,7 @@ class DigitisePanel(PointsPanel):
         with ui.element("div").classes("row-line"):
             name = ui.input("another point").props("dense outlined").style("width: 130px")
             ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
-            ui.button("Take back", on_click=self.remove).props("flat dense").tooltip("the chosen click")
+            ui.button("Remove", on_click=self.remove).props("flat dense").tooltip("the chosen click")
 
     def _build_comparison(self) -> None:
         runs = [run for run in list_runs(self.session.folder) if not holds_players(run)]
@@ -216,7 +216,8 @@ class DigitisePanel(PointsPanel):
         path = self.session.folder / self.file
         if self.model is not None and self.model.has_joints:
             paths = path.with_name(f"{path.stem}_joints.csv")
-            self.session.edit(paths.name, joint_paths_text(self.table, self.session.rig(), run_rows(run)), "joints")
+            text = joint_paths_text(self.table, self.session.rig(), run_rows(run))
+            self.session.edit(paths.name, text, "paths of the clicked joints")
             return assess(run, None, None, paths)["joints"].describe()
         return assess(run, None, path)["digitised"].describe()
 

@@ -13,6 +13,7 @@ from nicegui import ui
 from airborne.errors import UNDECIDED
 from airborne.io.text import read_json
 from airborne.motion.run_folder import CANDIDATES
+from airborne.run.find import describe_probability
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.session import Session
@@ -57,7 +58,7 @@ class FindControls:
         if command.code == 0:
             found = json.loads(command.output())
             self.candidates = ()
-            self.says = f"Found in frame {found['frame']}, probability {found['probability']:.3g}."
+            self.says = f"Found in frame {found['frame']}, {describe_probability(found['probability'])}."
             await self.show(found)
         else:
             document = read_json(self.session.folder / FOLDER / "find" / CANDIDATES)

@@ -17,6 +17,7 @@ from airborne.studio.session import Session
 _T = TypeVar("_T")
 _LOOK_EVERY_S = 1.0  # for changes by other windows and other programs
 _BLUE = "#0072b2"  # of buttons: dark enough for white letters
+_GREEN = "#007a5a"  # of good news, likewise
 _KEYS = {
     "← →": "one frame back or on; with Shift ten",
     ", .": "one frame back or on, also while a point is chosen",
@@ -29,9 +30,9 @@ _KEYS = {
     "C": "one camera alone, the next one, all of them",
     "click": "set the chosen point",
     "arrows": "move the chosen point by 0.1 px; with Shift by 1 px",
-    "E": "the same event in both cameras, where they are synchronised",
+    "E": "both pictures show the same event, where cameras are synchronised by hand",
     "N P": "choose the next point, the one before",
-    "Esc": "choose no mark",
+    "Esc": "let go of the chosen mark",
     "Ctrl+Z, Ctrl+Y": "undo, redo",
     "?": "this sheet",
 }
@@ -51,18 +52,19 @@ async def page_frame(
     What stands in it is built once the window is there, so that it may take its time.
     """
     changed: list[Callable[[], Awaitable[None]]] = []
-    ui.colors(primary=_BLUE)
+    ui.colors(primary=_BLUE, positive=_GREEN)
     sheet, example, known = _sheet(), _example(here), [session.stamp]
 
     async def move(verb: str) -> None:
         with errors_shown():
             what = session.editor.undo() if verb == "undo" else session.editor.redo()
-            ui.notify(f"{'undone' if verb == 'undo' else 'done again'}: {what}")
+            ui.notify(f"{'undone' if verb == 'undo' else 'redone'}: {what}")
             await look()
 
     async def look() -> None:
-        undo.set_enabled(session.editor.last is not None)
-        redo.set_enabled(session.editor.next is not None)
+        for button, tip, what in ((undo, undo_tip, session.editor.last), (redo, redo_tip, session.editor.next)):
+            button.set_enabled(what is not None)
+            tip.set_text(what or "nothing")
         if known[0] != (stamp := session.stamp):
             known[0] = stamp
             rail.refresh()
@@ -75,8 +77,10 @@ async def page_frame(
         name = f"{session.folder.name}/{session.path.name}"
         ui.label(name).classes("path small").tooltip(str(session.path))
         ui.element("div").classes("gap")
-        undo = ui.button(icon="undo", on_click=lambda: move("undo")).props("flat round dense aria-label=Undo")
-        redo = ui.button(icon="redo", on_click=lambda: move("redo")).props("flat round dense aria-label=Redo")
+        with ui.button(icon="undo", on_click=lambda: move("undo")).props("flat round dense aria-label=Undo") as undo:
+            undo_tip = ui.tooltip()
+        with ui.button(icon="redo", on_click=lambda: move("redo")).props("flat round dense aria-label=Redo") as redo:
+            redo_tip = ui.tooltip()
         ui.button("An example", on_click=example.open).props("flat dense no-caps")
         ui.button("Keys  ?", on_click=sheet.open).props("flat dense")
     with ui.element("div").classes("body"):

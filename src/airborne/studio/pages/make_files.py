@@ -26,8 +26,11 @@ class Making:
             self._formats = ui.select(list(EXPORT_FORMATS), label="formats, or all", value=[], multiple=True)
             self._formats.props("outlined dense options-dense").style("min-width: 220px")
             buttons = [ui.button("Export", on_click=self.export).props("outline")]
-            if any((folder / FOLDERS[2]).glob("overlay_*.mp4")):
+        if any((folder / FOLDERS[2]).glob("overlay_*.mp4")):
+            ui.label("A film").classes("soft")
+            with ui.element("div").classes("row-line"):
                 buttons.append(self._film())
+        with ui.element("div").classes("row-line"):
             self._watch = CommandWatch(session, f"files of {folder.name}", self.tell, words="working")
             self._watch.buttons = buttons
         self._links = ui.refreshable(self._list_files)
@@ -53,7 +56,7 @@ class Making:
     def _film(self) -> ui.button:
         self._first = ui.number("first frame", min=0, precision=0).props("outlined dense").style("width: 110px")
         self._last = ui.number("last frame", min=0, precision=0).props("outlined dense").style("width: 110px")
-        self._kind = ui.select(["mp4", "gif"], label="film", value="mp4").props("outlined dense options-dense")
+        self._kind = ui.select(["mp4", "gif"], label="kind", value="mp4").props("outlined dense options-dense")
         return ui.button("Make a film", on_click=self.film).props("outline")
 
     def _list_files(self) -> None:

@@ -26,7 +26,7 @@ class MaskPanel:
         """Lay it out; `on_change` is called with what was written."""
         self.session, self.shown, self._on_change = session, shown, on_change
         with ui.element("div").classes("row-line") as self.area:
-            self.camera = ui.select(shown.names, label="leave a camera out", value=shown.names[0])
+            self.camera = ui.select(shown.names, label="camera", value=shown.names[0])
             self.camera.props("outlined dense options-dense").style("min-width: 150px")
             last = len(shown.clock) - 1
             self.first, self.last = (

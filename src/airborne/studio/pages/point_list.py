@@ -53,7 +53,7 @@ class PointList:
     def _build_head(self) -> None:
         """Name the columns: the cameras, and the unit."""
         with ui.element("div").classes("point head"):
-            ui.label("residual [px]")
+            ui.label("off [px]")
             ui.element("div").classes("gap")
             for camera in self._cameras:
                 ui.label(camera).classes("n")._props["title"] = camera  # which may be cut

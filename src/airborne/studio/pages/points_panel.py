@@ -88,13 +88,13 @@ class PointsPanel:
         await self.save(self.clicked.click(name, camera, (u, v)), f"{name} moved in {camera}")
 
     async def remove(self) -> None:
-        """Take the chosen click back."""
+        """Remove the chosen click."""
         if self.selected is None:
             complain("choose a click first: click on its mark")
             return
         name, camera = self.selected.rsplit("|", 1)
         self.selected = None
-        await self.save(self.clicked.click(name, camera, (np.nan, np.nan)), f"{name} taken back in {camera}")
+        await self.save(self.clicked.click(name, camera, (np.nan, np.nan)), f"{name} removed in {camera}")
 
     async def select(self, mark: str | None) -> None:
         """Choose a mark, or none."""

@@ -45,7 +45,7 @@ class PoseStage:
         self.area.set_visibility(True)
         with self.area:
             middle = pose.world_from_root.translation
-            scene = draw_cameras(self.rig, middle=middle, away_m=_AWAY * size_m)
+            scene = draw_cameras(self.rig, seen_from=(middle, _AWAY * size_m))
         self._body = BodyOnStage(scene, self.hand.model, _BODY_MESH)
         self._gizmo = Gizmo(scene, _REACH * size_m, self.move)
         self.show(pose)

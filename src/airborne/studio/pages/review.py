@@ -20,12 +20,11 @@ from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
-from airborne.studio.stage import Arrow, BodyOnStage, draw_cameras
+from airborne.studio.stage import Arrow, BodyOnStage, draw_cameras, overview, reach_of
 from airborne.studio.view import CameraViews, Curves
 from airborne.tracking import Status
 
 _MOMENTUM_COLOUR, _LONGEST_M = "#d55e00", 1.0  # its arrow's length where it is greatest in the run
-_AROUND_M = 2.0  # how far from the path the scene is looked at from
 _HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations."
 
 
@@ -40,6 +39,7 @@ async def review_page(session: Session) -> None:
         if shown is None:
             return
         names = [each.name for each in runs]
+        nexts: dict[Status, ui.button] = {}
 
         async def change() -> None:
             others = [name for name in names if name != choice.value]
@@ -47,6 +47,9 @@ async def review_page(session: Session) -> None:
                 beside.set_options(["", *others], value="")  # which calls this again
                 return
             beside.set_options(["", *others])
+            there = await in_thread(_statuses, session.folder / choice.value)
+            for status, button in nexts.items():
+                button.set_enabled(status.value in there)
             content.clear()
             with content:
                 correction = await _show_run(session, shown, session.folder / choice.value, beside.value)
@@ -63,8 +66,9 @@ async def review_page(session: Session) -> None:
         says.bind_visibility_from(says, "text")
         content = ui.element("div").classes("split").style("flex-direction: column")
         with jumps:
-            ui.button("next uncertain", on_click=lambda: _jump(session, choice.value, Status.UNCERTAIN)).props("flat")
-            ui.button("next lost", on_click=lambda: _jump(session, choice.value, Status.LOST)).props("flat")
+            for status in (Status.UNCERTAIN, Status.LOST):
+                go = ui.button(f"next {status.value}", on_click=lambda _, to=status: _jump(session, choice.value, to))
+                nexts[status] = go.props("flat")
             blame = ui.button("which camera disagrees?", on_click=lambda: _blame(session, shown, choice.value, says))
             blame.props("flat")
         await change()
@@ -127,6 +131,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
         if correction is not None:
             correction.view = view
             with ui.element("div").classes("side"):
+                correction.build_watch()
                 bodies += await _stage(folder, session)
     curves = Curves(address, frame=session.frame)
     return correction
@@ -136,9 +141,9 @@ async def _stage(folder: Path, session: Session) -> list[Callable[[int], None]]:
     """Build the scene of a run of one body; return what shows a frame in it."""
     rows = await in_thread(run_rows, folder)
     model = await in_thread(run_body, folder)
-    path = rows.position[np.isfinite(rows.position).all(axis=1)]
-    near = {"middle": path.mean(axis=0), "away_m": _AROUND_M + float(np.ptp(path, axis=0).max())} if len(path) else {}
-    scene = draw_cameras(run_rig(folder), path=rows.position, **near)
+    path, reach_m = rows.position[np.isfinite(rows.position).all(axis=1)], reach_of(model)
+    around = overview(np.vstack([path - reach_m, path + reach_m])) if len(path) else None
+    scene = draw_cameras(run_rig(folder), rows.position, seen_from=around)
     body = BodyOnStage(scene, model, f"/mesh/{quote(folder.name)}/{{part}}")
 
     def show(frame: int) -> None:
@@ -172,16 +177,16 @@ class MomentumArrow:
         self._says.set_text(f"arrow: angular momentum {size:.3g} ± {sd:.3g} kg m²/s" if size else "")
 
 
+def _statuses(folder: Path) -> set[str]:
+    """Return the statuses that a run of one body has; players have one each, and none of all."""
+    return set() if holds_players(folder) else {str(status) for status in np.unique(run_rows(folder).status)}
+
+
 def _jump(session: Session, name: str, status: Status) -> None:
     """Show the next frame of a status after the one in view, or the first."""
-    folder = session.folder / name
-    if holds_players(folder):
-        complain("players have a status each; step through the strip below the curves")
-        return
-    rows = run_rows(folder)
+    rows = run_rows(session.folder / name)
     frames = rows.index[rows.status == status.value]
-    if not len(frames):
-        ui.notify(f"no frame is {status.value}")
+    if not len(frames):  # it was tracked again since
         return
     later = frames[frames > session.frame]
     ui.run_javascript(

@@ -64,7 +64,7 @@ class RulerPanel(PointsPanel):
             with ui.element("div").classes("side"):
                 with ui.element("div").classes("card"):
                     self.says = ui.label().classes("name")
-                    ui.button("Take the chosen click back", on_click=self.remove).props("flat dense")
+                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
                 self.list = PointList(self.shown.names, self.choose)
         await self.reread()
 

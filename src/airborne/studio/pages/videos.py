@@ -44,6 +44,7 @@ async def videos_page(session: Session) -> None:
         project = session.project()
         if project.mistake:
             ui.label(project.mistake).classes("bad")
+            ui.label(f"Open {session.path.name} in a text editor and correct it, then reload this page.")
         order = [camera.video for camera in project.cameras]  # the trial's, as its first camera is the clock
         files = list_videos(session.folder)
         files.sort(key=lambda path: order.index(path.name) if path.name in order else len(order))
@@ -61,7 +62,8 @@ async def videos_page(session: Session) -> None:
                 choices.append(_choose(project, path, facts))
                 _card(choices[-1], facts)
         with ui.element("div").classes("row-line"):
-            ui.button("Use these cameras", on_click=lambda: _save(session, choices)).props("unelevated")
+            use = ui.button("Use these cameras", on_click=lambda: _save(session, choices)).props("unelevated")
+            use.set_enabled(project.mistake is None)
             ui.label(f"writes {session.path.name}").classes("soft small")
             if len(project.cameras) > 1:
                 with ui.element("a").props('href="/sync"').classes("plain"):
@@ -72,7 +74,7 @@ def _facts(path: Path) -> VideoFacts | str:
     try:
         return inspect(VideoSource(path.name, path))
     except AirborneError as error:
-        return str(error)
+        return str(error).removeprefix(f"{path.name}: ").replace(str(path), "this file")
 
 
 def _choose(project: Project, path: Path, facts: VideoFacts | str) -> _Choice:
@@ -95,7 +97,7 @@ def _card(choice: _Choice, facts: VideoFacts | str) -> None:
         picture = ui.element("img").props(f"src=/thumbnail/{quote(choice.video)}")
         picture._props["alt"] = f"first picture of {choice.video}"  # a file's name may hold quotes
         ui.checkbox(choice.video).bind_value(choice, "is_camera").props("dense")
-        ui.label(_describe(facts)).classes("soft small")
+        ui.label().classes("soft small").bind_text_from(choice, "fields", lambda fields: _describe(facts, fields))
         ui.input("name of the camera").bind_value(choice, "name").props("dense outlined")
         fields = ui.select(_FIELDS, label="pictures are").bind_value(choice, "fields")
         fields.props("dense outlined options-dense")
@@ -120,9 +122,10 @@ def _show_orders(choice: _Choice) -> None:
                 ui.label(_FIELDS[order].removeprefix("two fields, ")).classes("small")
 
 
-def _describe(facts: VideoFacts) -> str:
+def _describe(facts: VideoFacts, fields: str) -> str:
     length = "" if facts.duration_s is None else f", {float(facts.duration_s):.1f} s"
-    return f"{facts.size[0]}×{facts.size[1]} px, {float(facts.frame_rate):.5g} pictures/s{length}"
+    halves = "" if fields == "progressive" else f" = {2 * float(facts.frame_rate):.5g} fields/s"
+    return f"{facts.size[0]}×{facts.size[1]} px, {float(facts.frame_rate):.5g} pictures/s{halves}{length}"
 
 
 def _save(session: Session, choices: list[_Choice]) -> None:
