@@ -53,10 +53,10 @@ def test_the_address_that_is_printed_is_the_page_that_was_open(tmp_path):
 
 def test_a_folder_is_open_in_one_studio_at_a_time(tmp_path, capsys):
     (folder := tmp_path / "A").mkdir()
-    with open_studio(folder) as address:
+    with fork_studio(folder) as address:
         says = refusal(capsys, "studio", folder, "--no-browser")
     assert "is open in another studio (process " in says
     assert address.partition("?")[0].rstrip("/") in says
     assert "token" not in says
-    with open_studio(folder):
+    with fork_studio(folder):
         pass
