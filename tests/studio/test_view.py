@@ -82,7 +82,7 @@ def test_the_frame_shown_is_the_one_asked_for(address):
         page.get_by_label("frame in view").press("Enter")
         wait_for_frame(page, 54)
         assert read_number(page, 0) == 54
-        page.get_by_text("of 0 to 59, 2.160 s").wait_for()
+        page.get_by_text("(0 to 59), 2.160 s").wait_for()
         canvas.press(" ")
         page.get_by_label("stop").wait_for()
         wait_for_frame(page, N - 1)

@@ -6,7 +6,7 @@ export default {
     <button type="button" :aria-label="playing ? 'stop' : 'play'" @click="toggle">{{ playing ? "❚❚" : "▶" }}</button>
     <input type="range" min="0" :max="n_frames - 1" :value="frame" aria-label="all frames" @input="go($event.target.value)" @keydown="leave">
     <input type="number" min="0" :max="n_frames - 1" :value="frame" aria-label="frame in view" @change="go($event.target.value)" @keydown="leave">
-    <span>of 0 to {{ n_frames - 1 }}{{ time_s === null ? "" : ", " + time_s.toFixed(3) + " s" }}</span>
+    <span>(0 to {{ n_frames - 1 }}){{ time_s === null ? "" : ", " + time_s.toFixed(3) + " s" }}</span>
   </div>`,
   props: { view: Number, n_frames: Number, start: Number },
   data() { return { frame: this.start, time_s: null, playing: false }; },
