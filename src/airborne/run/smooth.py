@@ -119,9 +119,7 @@ def smooth_run(
     (`fit_to_images`). Raises ResultError where the folder holds no run, and for what cannot be smoothed so.
     """
     if images is not None and (smoothing.method != "kalman" or holds_players(folder)):
-        raise ResultError(
-            "images are for the Kalman smoother of a run of one body; leave them out, or the other method"
-        )
+        raise ResultError("images are for the Kalman smoother of one body's run; leave them out, or the other method")
     run = _players_run(folder) if holds_players(folder) else _body_run(folder, images)
     events = _events(run, events_s)
     boundaries = {name: [event.time_s for event in each] for name, each in events.items()}

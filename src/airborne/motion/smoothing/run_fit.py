@@ -40,10 +40,12 @@ _SLACK = 1e-3  # of the cost: the refitted light makes it fluctuate
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Frames between which motion is smooth, three or more, and whether the body falls freely there."""
+    """Frames between which motion is smooth, three or more."""
 
     rows: slice
-    falls: bool
+    fall_offset_m: (
+        Array | None
+    )  # (3,) root's frame: of the centre of mass, which falls freely, from the body's; else None
 
 
 def fit_run(
@@ -74,10 +76,10 @@ class _Iterate:
         joining = []
         for stretch in self.stretches:
             poses, time_s = self.poses[stretch.rows], self.time_s[stretch.rows]
-            gravity = FREE_FALL_M_S2 if stretch.falls else np.zeros(3)
-            joining.append([acceleration_rows(poses, time_s, gravity)])
-            if stretch.falls:
-                joining[-1].append(fall_rows(self.model, poses, time_s))
+            offset_m = stretch.fall_offset_m
+            joining.append([acceleration_rows(poses, time_s, np.zeros(3) if offset_m is None else FREE_FALL_M_S2)])
+            if offset_m is not None:
+                joining[-1].append(fall_rows(self.model, poses, time_s, offset_m))
         return joining
 
     def cost(self, reference: _Iterate) -> float:
@@ -99,8 +101,11 @@ class _Iterate:
 
     def step(self, share: float) -> tuple[Sequence[Pose], float]:
         """Return the poses after a share of the step, and the decrease that the whole one predicts."""
-        deltas, predicted = self._step
-        return [move_pose(pose, share * x) for pose, x in zip(self.poses, deltas, strict=True)], predicted
+        (deltas, predicted), moved = self._step, list(self.poses)
+        for stretch in self.stretches:
+            pairs = zip(self.poses[stretch.rows], deltas[stretch.rows], strict=True)
+            moved[stretch.rows] = [move_pose(pose, share * x) for pose, x in pairs]
+        return moved, predicted
 
 
 def acceleration_rows(poses: Sequence[Pose], time_s: Array, gravity_m_s2: Array) -> JoiningRows:
@@ -126,10 +131,15 @@ def acceleration_rows(poses: Sequence[Pose], time_s: Array, gravity_m_s2: Array)
     return _in_sds(rows, values, np.sqrt(_DENSITY / between_s))
 
 
-def fall_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array) -> JoiningRows:
-    """Return how far the acceleration of the centre of mass is from gravity: in sds, three of each three frames."""
+def fall_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, offset_m: Array) -> JoiningRows:
+    """Return how far the acceleration of the centre of mass is from gravity: in sds, three of each three frames.
+
+    It lies by an offset (3,) in the root's frame beside that of the body, whose masses are not quite the person's.
+    """
     centres = [centre_of_mass(model.with_pose(pose)) for pose in poses]
-    place, slope = np.array([each[0] for each in centres]), np.array([each[1] for each in centres])
+    offsets = np.array([pose.world_from_root.rotation.apply(offset_m) for pose in poses])
+    place, slope = np.array([each[0] for each in centres]) + offsets, np.array([each[1] for each in centres])
+    slope[:, :, 3:6] -= np.cross(offsets[:, None], np.eye(3)).swapaxes(1, 2)  # w x offset
     before_s, after_s = np.diff(time_s)[:-1], np.diff(time_s)[1:]
     between_s, n = (before_s + after_s) / 2, len(before_s)
     weights = np.stack([1 / before_s, -1 / before_s - 1 / after_s, 1 / after_s], axis=1) / between_s[:, None]
