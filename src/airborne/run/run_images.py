@@ -11,7 +11,7 @@ import numpy as np
 from airborne.body import BodyModel, Pose
 from airborne.errors import ResultError
 from airborne.motion import Motion, read_estimates
-from airborne.motion.flight.momentum_table import free_fall
+from airborne.motion.flight.momentum_table import falls_freely
 from airborne.motion.run_folder import MOTION
 from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run
 from airborne.motion.smoothing.segments import segment_numbers, stretches
@@ -48,9 +48,8 @@ def fit_to_images(
     posed = np.flatnonzero(motion.has_pose)
     is_known, segment = motion.has_pose[posed], segment_numbers(motion.time_s, boundaries_s)[posed]
     fitted = [
-        Stretch(rows, None if fall is None else fall.offset_m)
+        Stretch(rows, falls_freely(motion, model, posed[rows]))
         for rows in stretches(motion.time_s[posed], is_known, segment, 0.0)
-        for fall in [free_fall(motion, model, posed[rows])]
     ]
     images = _RunImages.read(folder, trial, model, progress=progress)
     poses = fit_run(model, [motion.pose(row) for row in posed], motion.time_s[posed], fitted, images.look)

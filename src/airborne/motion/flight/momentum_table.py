@@ -12,7 +12,7 @@ from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.fall import UNKNOWN_SD_M, Fall, fit_fall, flight_rows
+from airborne.motion.flight.fall import UNKNOWN_SD_M, fit_fall, flight_rows
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
@@ -54,13 +54,13 @@ def has_inertias(model: BodyModel) -> bool:
     return all(segment.inertia is not None for segment in model.segments)
 
 
-def free_fall(motion: Motion, model: BodyModel, rows: NDArray[np.intp]) -> Fall | None:
-    """Fit the fall of the centre of mass over rows with poses, 12 or more; None where it does not fall freely."""
+def falls_freely(motion: Motion, model: BodyModel, rows: NDArray[np.intp]) -> bool:
+    """Tell whether the centre of mass of a body with masses falls freely over rows with poses, 12 or more."""
     if len(rows) < _FEWEST or not has_inertias(model):
-        return None
+        return False
     com = np.array([centre_of_mass(model.with_pose(motion.pose(row)))[0] for row in rows])
     fall = fit_fall(motion.time_s[rows], com, motion.R[rows])
-    return fall if fall.is_free and fall.gravity_sd_m_s2 < _MOST_SD_M_S2 else None
+    return fall.is_free and fall.gravity_sd_m_s2 < _MOST_SD_M_S2
 
 
 def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr.Dataset:

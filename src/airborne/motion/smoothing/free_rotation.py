@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from airborne.body import BodyModel
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.motion.flight.momentum import angular_momentum
-from airborne.motion.flight.momentum_table import free_fall, has_inertias
+from airborne.motion.flight.momentum_table import falls_freely, has_inertias
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.butterworth import butterworth_smoother, is_evenly_sampled
 from airborne.motion.smoothing.rotations import SmoothedRotations, smooth_rotations
@@ -74,7 +74,7 @@ def _flights(rotations: SmoothedRotations, motion: Motion, model: BodyModel) -> 
     for rows in np.split(np.arange(len(label)), np.flatnonzero(np.diff(label)) + 1):
         posed, time_s = rows[motion.has_pose[rows]], motion.time_s[rows]
         is_even = is_evenly_sampled(time_s) and np.diff(time_s).max() < 1 / (2 * _LIMB_HZ)
-        if label[rows[0]] >= 0 and is_even and free_fall(motion, model, posed) is not None:
+        if label[rows[0]] >= 0 and is_even and falls_freely(motion, model, posed):
             yield slice(int(rows[0]), int(rows[-1]) + 1)
 
 

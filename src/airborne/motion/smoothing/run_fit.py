@@ -22,6 +22,7 @@ from airborne.body.chain import delta_between, move_pose
 from airborne.constants import FREE_FALL_M_S2
 from airborne.geometry.banded_equations import BandedEquations, JoiningRows
 from airborne.geometry.descent import BacktrackingRule, descend
+from airborne.motion.flight.fall import fit_fall
 from airborne.motion.flight.momentum import centre_of_mass
 from airborne.tracking.model_based.image_evidence import ImageEvidence
 from airborne.types import Array
@@ -31,21 +32,21 @@ Look = Callable[[Sequence[Pose]], Sequence[ImageEvidence]]  # one pass over the 
 # spectral density of the accelerations [m2/s3, rad2/s3]: sds of 30 m/s2 and rad/s2 at 50 frames/s; of 15, 30 and 60
 # the least errors of four synthetic somersaults
 _DENSITY = 30.0**2 / 50
-_FALL_DENSITY = 0.3**2 / 50  # [m2/s3] of the centre of mass's in flight: 1 m/s2 gains less; below it, masses are wrong
+# [m2/s3] of the centre of mass's in flight, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2 the least errors
+# of eight, four of them tracked with bodies of other lengths and girths
+_FALL_DENSITY = 0.3**2 / 50
 _DAMPING = 1e-4  # [1/m2, 1/rad2] holds what neither images nor neighbours show
-N_STEPS = 4  # on seven synthetic somersaults errors fall up to the fourth; further steps fit what the images have wrong
+N_STEPS = 4  # on seven synthetic somersaults errors fall up to the fourth; further steps fit what images have wrong
 _SHORTER, _LEAST_SHARE = 0.4, 0.1  # factor on a step that does not lower the cost, and the least share of one
 _SLACK = 1e-3  # of the cost: the refitted light makes it fluctuate
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Frames between which motion is smooth, three or more."""
+    """Frames between which motion is smooth, three or more, and whether the body falls freely there: then four."""
 
     rows: slice
-    fall_offset_m: (
-        Array | None
-    )  # (3,) root's frame: of the centre of mass, which falls freely, from the body's; else None
+    falls: bool
 
 
 def fit_run(
@@ -76,9 +77,10 @@ class _Iterate:
         joining = []
         for stretch in self.stretches:
             poses, time_s = self.poses[stretch.rows], self.time_s[stretch.rows]
-            offset_m = stretch.fall_offset_m
-            joining.append([acceleration_rows(poses, time_s, np.zeros(3) if offset_m is None else FREE_FALL_M_S2)])
-            if offset_m is not None:
+            gravity_m_s2 = FREE_FALL_M_S2 if stretch.falls else np.zeros(3)
+            joining.append([acceleration_rows(poses, time_s, gravity_m_s2)])
+            if stretch.falls:
+                offset_m = fall_offset_m(self.model, poses, time_s)
                 joining[-1].append(fall_rows(self.model, poses, time_s, offset_m))
         return joining
 
@@ -131,10 +133,19 @@ def acceleration_rows(poses: Sequence[Pose], time_s: Array, gravity_m_s2: Array)
     return _in_sds(rows, values, np.sqrt(_DENSITY / between_s))
 
 
+def fall_offset_m(model: BodyModel, poses: Sequence[Pose], time_s: Array) -> Array:
+    """Return by what the centre of mass lies beside the body's, in the root's frame, to fall as it does: (3,) [m].
+
+    The body's masses are not quite the person's; see `fit_fall`.
+    """
+    place = np.array([centre_of_mass(model.with_pose(pose))[0] for pose in poses])
+    return fit_fall(time_s, place, np.array([pose.world_from_root.rotation.as_matrix() for pose in poses])).offset_m
+
+
 def fall_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, offset_m: Array) -> JoiningRows:
     """Return how far the acceleration of the centre of mass is from gravity: in sds, three of each three frames.
 
-    It lies by an offset (3,) in the root's frame beside that of the body, whose masses are not quite the person's.
+    It lies by an offset (3,) in the root's frame beside that of the body.
     """
     centres = [centre_of_mass(model.with_pose(pose)) for pose in poses]
     offsets = np.array([pose.world_from_root.rotation.apply(offset_m) for pose in poses])
