@@ -30,7 +30,7 @@ def scene():
     scene = somersault_scene("moving-arms", target="ellipsoids")
     cameras = (
         each.resample(
-            scale=(SCALE, SCALE), offset=((SCALE - 1) / 2,) * 2, size=tuple(side // SCALE for side in each.size)
+            scale=(SCALE, SCALE), offset=((SCALE - 1) / 2,) * 2, size=(each.size[0] // SCALE, each.size[1] // SCALE)
         )
         for each in scene.rig
     )

@@ -68,7 +68,7 @@ def test_rows_follow_their_derivatives(rows):
     def at(poses):
         if rows == "fall":
             return fall_rows(HUMAN, poses, time_s, OFFSET_M)
-        return acceleration_rows(poses, time_s, FREE_FALL_M_S2)
+        return acceleration_rows(HUMAN, poses, time_s, FREE_FALL_M_S2)
 
     here, step, rng = at(poses), 1e-6, np.random.default_rng(2)
     for k in range(3):
@@ -101,8 +101,8 @@ def test_steady_motion_has_no_acceleration_but_gravity():
     poses = [TRUTH[0]]
     for _ in range(5):
         poses.append(move_pose(poses[-1], step))
-    np.testing.assert_allclose(acceleration_rows(poses, TIME_S[:6], REST).values, 0, atol=1e-6)
-    falling = acceleration_rows(poses, TIME_S[:6], FREE_FALL_M_S2).values
+    np.testing.assert_allclose(acceleration_rows(HUMAN, poses, TIME_S[:6], REST).values, 0, atol=1e-6)
+    falling = acceleration_rows(HUMAN, poses, TIME_S[:6], FREE_FALL_M_S2).values
     np.testing.assert_allclose(falling[:, :2], 0, atol=1e-6)
     assert (falling[:, 2] > 0).all()
 

@@ -31,7 +31,7 @@ from airborne.types import Array
 # of the joints' low-pass: trunks hardly move, but are tracked to and fro against the pelvis. Chosen on synthetic
 # somersaults 71 and 72, arms and pikes: with 2 Hz of all, angular velocities err by 30 to 55 % of the tracked ones,
 # so by 22 to 47 %, with 2 to 4 Hz of the limbs alike
-_TRUNK, _TRUNK_HZ, _LIMB_HZ = ("torso", "chest", "head", "shoulder_left", "shoulder_right"), 1.0, 4.0
+TRUNK, _TRUNK_HZ, _LIMB_HZ = ("torso", "chest", "head", "shoulder_left", "shoulder_right"), 1.0, 4.0
 _TRACKED_SD_RAD = np.radians(5.0)  # of tracked orientations; further ones count less: of the same somersaults 2 to 3
 _MOST_OFF = 1.5  # median distance of tracked orientations from a flight's, in these sds; the same have up to 0.8
 _LONGEST_GAP_S = 0.5  # in a stretch, beyond any that may be filled
@@ -83,7 +83,7 @@ def _smooth_joints(motion: Motion, rows: slice) -> tuple[Array, Array]:
     unknown = np.full(rows.stop - rows.start, np.nan)
     joints = []
     for name, angles in zip(motion.joints, motion.joint_angles[rows].swapaxes(0, 1), strict=True):
-        smooth = partial(butterworth_smoother, cutoff_hz=_TRUNK_HZ if name in _TRUNK else _LIMB_HZ)
+        smooth = partial(butterworth_smoother, cutoff_hz=_TRUNK_HZ if name in TRUNK else _LIMB_HZ)
         R = matrix_from_angles(angles)
         joints.append(smooth_rotations(smooth, motion.time_s[rows], R, unknown, fill_s=_LONGEST_GAP_S))
     R = np.stack([joint.R for joint in joints], axis=1)
