@@ -30,12 +30,10 @@ from airborne.types import Array
 
 Look = Callable[[Sequence[Pose]], Sequence[ImageEvidence]]  # one pass over the images of a run, a pose each frame
 
-# spectral densities of accelerations [m2/s3, rad2/s3]: of the root and of limbs sds of 30 m/s2 and rad/s2 at 50 frames/s;
-# of 15, 20, 30 and 60 the least errors of joints of synthetic somersaults
+# spectral densities of accelerations [m2/s3, rad2/s3]: of root and limbs an sd of 30 m/s2 and rad/s2 at 50 frames/s, of
+# 15, 20, 30 and 60 that with the least errors of joints on synthetic somersaults
 _DENSITY = 30.0**2 / 50
-_TRUNK_DENSITY = (
-    10.0**2 / 50
-)  # of the trunk's joints: of 5, 10 and 30 rad/s2 the least of eight, the largest errors too
+_TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: 5 rad/s2 gains 0.1 % in mean errors, but the largest grow; 30 less
 # [m2/s3] of the centre of mass's in flight, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2 the least errors
 # of the same, four of them tracked with bodies of other lengths and girths
 _FALL_DENSITY = 0.3**2 / 50
