@@ -33,7 +33,7 @@ Look = Callable[[Sequence[Pose]], Sequence[ImageEvidence]]  # one pass over the 
 # spectral densities of accelerations [m2/s3, rad2/s3]: of root and limbs an sd of 30 m/s2 and rad/s2 at 50 frames/s, of
 # 15, 20, 30 and 60 that with the least errors of joints on synthetic somersaults
 _DENSITY = 30.0**2 / 50
-_TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: 5 rad/s2 gains 0.1 % in mean errors, but the largest grow; 30 less
+_TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: with 30 rad/s2 joints err by 0.7 % more; with 5 the largest do
 # [m2/s3] of the centre of mass's in flight, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2 the least errors
 # of the same, four of them tracked with bodies of other lengths and girths
 _FALL_DENSITY = 0.3**2 / 50
