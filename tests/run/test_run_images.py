@@ -28,9 +28,10 @@ OFF_M, OFF_RAD = 0.01, 0.05  # by which poses are wrong in every frame, in each 
 def scene():
     """The beginning of a somersault, small."""
     scene = somersault_scene("moving-arms", target="ellipsoids")
+    middle = (SCALE - 1) / 2
     cameras = (
         each.resample(
-            scale=(SCALE, SCALE), offset=((SCALE - 1) / 2,) * 2, size=(each.size[0] // SCALE, each.size[1] // SCALE)
+            scale=(SCALE, SCALE), offset=(middle, middle), size=(each.size[0] // SCALE, each.size[1] // SCALE)
         )
         for each in scene.rig
     )

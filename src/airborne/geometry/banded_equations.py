@@ -12,10 +12,13 @@ from airborne.types import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JoiningRows:
-    """Residuals in standard deviations of three successive times each, linear in their unknowns."""
+    """Residuals in standard deviations of three successive times each, linear in their unknowns.
 
-    by_change: Array  # (n - 2, k, 3, d) their derivatives
-    values: Array  # (n - 2, k)
+    The d unknowns of a time are in groups of w, one after another; k residuals depend on one group alone.
+    """
+
+    by_change: Array  # (n - 2, d / w, k, 3, w) their derivatives
+    values: Array  # (n - 2, d / w, k)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,13 +34,15 @@ class BandedEquations:
         n, d = right.shape
         blocks, right = (own.copy(), np.zeros((n - 1, d, d)), np.zeros((n - 2, d, d))), right.copy()
         for each in joining:
+            w = each.by_change.shape[-1]
+            group = np.arange(d // w)
             for i, (rows, values) in enumerate(zip(each.by_change, each.values, strict=True)):
-                flat = rows.reshape(len(values), 3 * d)
-                square = (flat.T @ flat).reshape(3, d, 3, d)
-                right[i : i + 3] -= (values @ flat).reshape(3, d)
+                squares = np.einsum("gksv,gktw->stgvw", rows, rows)
+                right[i : i + 3] -= np.einsum("gk,gktw->tgw", values, rows).reshape(3, d)
                 for column in range(3):
                     for row in range(column, 3):
-                        blocks[row - column][i + column] += square[row, :, column]
+                        block = blocks[row - column][i + column].reshape(d // w, w, d // w, w)
+                        block[group, :, group] += squares[row, column]
         return cls(blocks, right)
 
     def solve(self) -> Array:

@@ -113,28 +113,29 @@ class _Iterate:
 
 
 def acceleration_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, gravity_m_s2: Array) -> JoiningRows:
-    """Return the second derivatives of the poses (n,), less gravity (3,): in sds, d of each three frames.
+    """Return the second derivatives of the poses (n,), less gravity (3,): in sds, each group of three by itself.
 
     To first order a change of the later of two poses changes the delta between them as much; a change of the earlier
     one, seen from the later, by minus as much, turned with it.
     """
-    step_s, d = np.diff(time_s), model.n_dofs
-    rate, by_change = np.zeros((len(step_s), d)), np.zeros((len(step_s), d, 2, d))
+    step_s, n_groups = np.diff(time_s), model.n_dofs // 3  # of the root's position, its rotation, each joint's
+    rate, turn = np.zeros((len(step_s), n_groups, 3)), np.zeros((len(step_s), n_groups, 3, 3))
     for i, dt_s in enumerate(step_s):
-        delta, turn = delta_between(poses[i], poses[i + 1]), np.eye(d)
-        turn[3:6, 3:6] = Rotation.from_rotvec(delta[3:6]).as_matrix()
-        for joint in range(6, d, 3):  # a joint's change is in its segment's axes, which turn with it
-            own = slice(joint, joint + 3)
-            turn[own, own] = Rotation.from_rotvec(-delta[own]).as_matrix()
-        rate[i], by_change[i, :, 0], by_change[i, :, 1] = delta / dt_s, -turn / dt_s, np.eye(d) / dt_s
-    between_s = (step_s[1:] + step_s[:-1]) / 2
-    values, rows = np.diff(rate, axis=0) / between_s[:, None], np.zeros((len(between_s), d, 3, d))
-    rows[:, :, 1:] += by_change[1:] / between_s[:, None, None, None]
-    rows[:, :, :2] -= by_change[:-1] / between_s[:, None, None, None]
-    values[:, :3] -= gravity_m_s2
+        delta = delta_between(poses[i], poses[i + 1]).reshape(n_groups, 3)
+        turned = delta * np.where(np.arange(n_groups) == 1, 1, -1)[:, None]  # a joint's axes turn with its segment
+        turned[0] = 0
+        rate[i], turn[i] = delta / dt_s, Rotation.from_rotvec(turned).as_matrix()
+    between_s = (step_s[1:] + step_s[:-1])[:, None] / 2
+    before, after = between_s * step_s[:-1, None], between_s * step_s[1:, None]
+    rows = np.zeros((len(between_s), n_groups, 3, 3, 3))
+    rows[:, :, :, 0] = turn[:-1] / before[..., None, None]
+    rows[:, :, :, 1] = -turn[1:] / after[..., None, None] - np.eye(3) / before[..., None, None]
+    rows[:, :, :, 2] = np.eye(3) / after[..., None, None]
+    values = np.diff(rate, axis=0) / between_s[..., None]
+    values[:, 0] -= gravity_m_s2
     is_trunk = [False] * 2 + [segment.name in TRUNK for segment in model.segments[1:]]
-    density = np.repeat(np.where(is_trunk, _TRUNK_DENSITY, _DENSITY), 3)
-    return _in_sds(rows, values, np.sqrt(density / between_s[:, None]))
+    sd = np.sqrt(np.where(is_trunk, _TRUNK_DENSITY, _DENSITY) / between_s)
+    return JoiningRows(rows / sd[..., None, None, None], values / sd[..., None])
 
 
 def fall_offset_m(model: BodyModel, poses: Sequence[Pose], time_s: Array) -> Array:
@@ -160,8 +161,5 @@ def fall_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, offset_m: 
     weights = np.stack([1 / before_s, -1 / before_s - 1 / after_s, 1 / after_s], axis=1) / between_s[:, None]
     values = sum(weights[:, j, None] * place[j : n + j] for j in range(3)) - FREE_FALL_M_S2
     rows = np.stack([weights[:, j, None, None] * slope[j : n + j] for j in range(3)], axis=2)
-    return _in_sds(rows, values, np.sqrt(_FALL_DENSITY / between_s[:, None]))
-
-
-def _in_sds(rows: Array, values: Array, sd: Array) -> JoiningRows:
-    return JoiningRows(rows / sd[:, :, None, None], values / sd)
+    sd = np.sqrt(_FALL_DENSITY / between_s)[:, None, None]
+    return JoiningRows(rows[:, None] / sd[..., None, None], values[:, None] / sd)
