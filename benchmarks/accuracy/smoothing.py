@@ -50,8 +50,8 @@ def measure(name: str, folder: Path, run: Path) -> list[dict]:
         {**common, "method": "tracked", "metric": "angular velocity, RMS", "unit": "rad/s", "value": tracked_w},
     ]
     fitted = fit_to_images(run, read_trial(folder / "trial.toml"), motion, model)
-    for method, (each, body) in {"kalman": (motion, model), "images, kalman": fitted}.items():
-        joints, root = smooth_landmarks(each, body, _KALMAN, []), smooth_root(each, body, _KALMAN, [])
+    for method, each in {"kalman": motion, "images, kalman": fitted}.items():
+        joints, root = smooth_landmarks(each, model, _KALMAN, []), smooth_root(each, model, _KALMAN, [])
         smooth, sd = (joints[key].to_numpy()[:, : len(model.landmarks)] for key in ("position", "position_sd"))
         w, w_sd = root["angular_velocity"].to_numpy(), root["angular_velocity_sd"].to_numpy()[:, None]
         all_mm, free_mm = truth.mean_mm(each, smooth)

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from airborne.body.chain import move_pose
-from airborne.body.files import read_body, write_body
-from airborne.body.shaping import half_widths_m, with_girths
+from airborne.body.files import write_body
 from airborne.cameras import Rig
 from airborne.io.writing import write_text
 from airborne.motion import MotionWriter
-from airborne.motion.run_folder import BODY, MOTION, RUN_RECORD, SMOOTH_BODY
+from airborne.motion.run_folder import BODY, MOTION, RUN_RECORD
 from airborne.run.folder import run_identity
 from airborne.synthetic import somersault_scene, write_trial
 from airborne.tracking import Estimate, Status
@@ -41,19 +40,13 @@ def scene():
 
 @pytest.fixture(scope="module")
 def folder(scene, tmp_path_factory):
-    """Its trial, and a run of it whose poses are a little wrong in every frame."""
+    """Its trial, and a run of it whose poses are a little wrong in every frame, without one that was lost."""
     folder = tmp_path_factory.mktemp("somersault")
     write_trial(scene, folder / "trial")
-    write_run(folder / "run", scene, scene.model, folder / "trial" / "trial.toml")
-    return folder
-
-
-def write_run(run, scene, model, trial):
-    """A run of a trial whose poses are a little wrong in every frame."""
-    rng = np.random.default_rng(4)
+    run, model, rng = folder / "run", scene.model, np.random.default_rng(4)
     run.mkdir()
     write_body(run / BODY, model)
-    write_text(run / RUN_RECORD, json.dumps(run_identity(read_trial(trial))))
+    write_text(run / RUN_RECORD, json.dumps(run_identity(read_trial(folder / "trial" / "trial.toml"))))
     flight = scene.flight(np.array([float(scene.time_s(k)) for k in range(N)]))
     sd = np.repeat([OFF_M, OFF_RAD], [3, model.n_dofs - 3])
     with MotionWriter(run / MOTION, tuple(segment.name for segment in model.segments[1:])) as writer:
@@ -70,6 +63,7 @@ def write_run(run, scene, model, trial):
                     n_views=len(scene.rig),
                 )
             )
+    return folder
 
 
 def errors_mm(scene, path):
@@ -99,26 +93,6 @@ def test_images_say_more_than_the_tracked_poses(scene, folder, tmp_path):
     assert images < 0.6 * plain
     assert "fitted at once to its images" in json.loads((tmp_path / "images/smooth.json").read_text())["history"][0]
     assert contents_of(folder) == before
-
-
-def test_a_preset_is_fitted_again_to_the_whole_run(scene, folder, tmp_path):
-    trial = folder / "trial" / "preset.toml"
-    trial.write_text(
-        (folder / "trial" / "trial.toml")
-        .read_text()
-        .replace('file = "body.toml"', 'preset = "human18"\nstature_m = 1.66\nmass_kg = 58.0')
-    )
-    names = [f"{name}_{side}" for name in ("upper_arm", "thigh", "shank") for side in ("left", "right")]
-    stout = with_girths(scene.model, dict.fromkeys(names, 1.3))
-    write_run(tmp_path / "run", scene, stout, trial)
-    assert in_process("smooth", tmp_path / "run", "--kalman", "--events", "none", "--images", trial) == 0
-    fitted = read_body(tmp_path / "run" / SMOOTH_BODY)
-    index = [fitted.index_of(name) for name in names]
-    before, after, true = (half_widths_m(model)[index] for model in (stout, fitted, scene.model))
-    assert np.mean(abs(after - true)) < 0.5 * np.mean(abs(before - true))
-    record = json.loads((tmp_path / "run/smooth.json").read_text())
-    assert SMOOTH_BODY in record["files"] and SMOOTH_BODY in record["history"][1]
-    np.testing.assert_allclose(half_widths_m(read_body(tmp_path / "run" / BODY))[index], before)  # stays
 
 
 def test_another_trial_and_another_method_are_refused(folder, capsys):

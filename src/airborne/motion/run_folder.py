@@ -17,7 +17,7 @@ from airborne.motion.players import PlayersMotion, read_players
 MOTION, JOINTS, JUMPS = "motion.csv", "joints.csv", "jumps.csv"
 SUMMARY, REPORT, RUN_RECORD = "summary.json", "report.html", "run.json"
 CALIBRATION, BODY = "calib.toml", "body.toml"
-SMOOTH_RECORD, SMOOTH_BODY = "smooth.json", "smooth_body.toml"
+SMOOTH_RECORD = "smooth.json"
 CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
 PICTURES = "pictures.json"  # beside the videos: some of their pictures
 FOLDERS = TABLES, FIGURES, VIDEOS = "tables", "figures", "videos"

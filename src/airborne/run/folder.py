@@ -30,7 +30,6 @@ from airborne.motion.run_folder import (
     MOTION,
     REPORT,
     RUN_RECORD,
-    SMOOTH_BODY,
     SMOOTH_RECORD,
     SUMMARY,
     read_record,
@@ -139,7 +138,6 @@ def _remove_run(folder: Path) -> None:
         COVARIANCE_FILE,
         LASTING_FILE,
         SMOOTH_RECORD,
-        SMOOTH_BODY,
         *_BEFORE_A_RUN,
     ):
         (folder / name).unlink(missing_ok=True)

@@ -11,14 +11,12 @@ import numpy as np
 import xarray as xr
 
 from airborne import __version__
-from airborne.body.files import write_body
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.export.analysis_figures import write_residuals
 from airborne.motion import landmarks
 from airborne.motion.flight.phases import Event, body_events, player_events
 from airborne.motion.run_folder import (
-    SMOOTH_BODY,
     SMOOTH_RECORD,
     figures_of,
     holds_players,
@@ -179,20 +177,15 @@ def _players_run(folder: Path) -> _Run:
 
 
 def _body_run(folder: Path, images: Trial | None) -> _Run:
-    tracked, tracked_model = read_body_run(folder)
+    tracked, model = read_body_run(folder)
 
     def write(
         out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
     ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
-        times, notes, added = [event.time_s for event in events[""]], list[str](), tuple[str, ...]()
-        motion, model = tracked, tracked_model
+        times, motion, notes = [event.time_s for event in events[""]], tracked, list[str]()
         if images is not None:
-            motion, model = fit_to_images(folder, images, motion, model, boundaries_s=times, progress=progress)
+            motion = fit_to_images(folder, images, tracked, model, boundaries_s=times, progress=progress)
             notes.append("the whole run was fitted at once to its images, with smooth accelerations and free falls")
-            if model is not tracked_model:
-                write_body(out / SMOOTH_BODY, model)
-                notes.append(f"the body was fitted anew, to frames of the whole run: {SMOOTH_BODY}")
-                added = (SMOOTH_BODY,)
         root = smooth_root(motion, model, smoothing, times)
         joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
         write_smooth_motion(out / MOTION, root)
@@ -205,11 +198,10 @@ def _body_run(folder: Path, images: Trial | None) -> _Run:
             files = (MOTION, JOINTS, ANGLES, EVENTS)
         for table in tables.values():
             table.attrs["history"] = [*notes, *table.attrs["history"]]
-        return tables, (*files, *added)
+        return tables, files
 
-    points, _ = landmarks(tracked, tracked_model)
-    owners = ("",) * points.shape[1]
-    return _Run(tracked.time_s, points, owners, lambda: {"": body_events(tracked, tracked_model)}, write)
+    points, _ = landmarks(tracked, model)
+    return _Run(tracked.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(tracked, model)}, write)
 
 
 def _has_stretch(run: _Run, boundaries_s: dict[str, list[float]], fill_s: float) -> bool:
