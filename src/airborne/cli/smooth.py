@@ -42,7 +42,7 @@ def smooth_command(
     """Smooth a run and compute velocities and accelerations: new tables beside the raw ones.
 
     Without --butterworth, --spline or --kalman the Kalman smoother, which uses the run's own covariances. With --images
-    it gets better poses, and of a preset a better body, from the videos.
+    it gets better poses from the videos.
 
     Example: airborne smooth results --images trial.toml
     """
@@ -52,7 +52,8 @@ def smooth_command(
 
     if butterworth is None and not (spline or kalman):
         kalman = True
-        errors.print("smoothing with --kalman and the run's own covariances: no method was chosen", markup=False)
+        if images is None:
+            errors.print("smoothing with --kalman and the run's own covariances: no method was chosen", markup=False)
     settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
         trial = None if images is None else read_trial(images)
