@@ -36,6 +36,7 @@ from airborne.motion.run_folder import (
 )
 from airborne.trial.file import Trial
 
+_START_AND_LIGHTS = "start and lights"  # stands among the input files for the tables that a trial file itself holds
 START = "start"  # stands for the digest of the first key, which other digests hold
 _BEFORE_A_RUN = {CANDIDATES, CANDIDATES_PICTURE}  # what a start that is undecided leaves
 
@@ -151,6 +152,24 @@ def holds_run_of(trial: Trial, folder: Path) -> bool:
     return record.is_file() and read_record(record) == run_identity(trial)
 
 
+def require_run_of(trial: Trial, folder: Path) -> None:
+    """Raise ResultError where a folder's run was not tracked from the files and masks of this trial.
+
+    Settings of the tracking and keys may be others. So may be the start, if the trial leaves it to be found.
+    """
+    recorded, now = read_record(folder / RUN_RECORD), run_identity(trial)
+    inputs = [dict(each.get("inputs", {})) for each in (recorded, now)]
+    if trial.start.find:
+        for each in inputs:
+            each.pop(_START_AND_LIGHTS, None)
+    differing = [name for name in {**inputs[0], **inputs[1]} if inputs[0].get(name) != inputs[1].get(name)]
+    differing += ["masks"] * (recorded.get("masks", []) != now["masks"])
+    if differing:
+        raise ResultError(
+            f"{folder} holds a run of another trial (other {', '.join(differing)}); give that which it was tracked from"
+        )
+
+
 def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     """Return what two runs share if one can resume the other."""
     settings = {
@@ -179,7 +198,7 @@ def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
     rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
     start = json.dumps([table and table.model_dump() for table in rest])
     hashes = {name: file_digest(trial.path(name)) for name in names}
-    return {**hashes, "start and lights": hashlib.sha256(start.encode()).hexdigest()}
+    return {**hashes, _START_AND_LIGHTS: hashlib.sha256(start.encode()).hexdigest()}
 
 
 def _further_files(trial: Trial) -> list[str]:

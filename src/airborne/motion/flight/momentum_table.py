@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
@@ -20,6 +21,9 @@ from airborne.types import Array, Triple
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_MOST_SD_M_S2 = 2.5  # of a fall's gravity: more tells nothing of whether it is free, as in `flight.fall`
+_FEWEST = 12  # frames of a fall, twice the numbers that say how a body turns in it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +52,15 @@ class FlightSummary:
 def has_inertias(model: BodyModel) -> bool:
     """Tell whether every segment of a body has a mass."""
     return all(segment.inertia is not None for segment in model.segments)
+
+
+def falls_freely(motion: Motion, model: BodyModel, rows: NDArray[np.intp]) -> bool:
+    """Tell whether the centre of mass of a body with masses falls freely over rows with poses, 12 or more."""
+    if len(rows) < _FEWEST or not has_inertias(model):
+        return False
+    com = np.array([centre_of_mass(model.with_pose(motion.pose(row)))[0] for row in rows])
+    fall = fit_fall(motion.time_s[rows], com, motion.R[rows])
+    return fall.is_free and fall.gravity_sd_m_s2 < _MOST_SD_M_S2
 
 
 def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr.Dataset:

@@ -20,21 +20,18 @@ from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.motion.flight.fall import fit_fall
-from airborne.motion.flight.momentum import angular_momentum, centre_of_mass
-from airborne.motion.flight.momentum_table import has_inertias
+from airborne.motion.flight.momentum import angular_momentum
+from airborne.motion.flight.momentum_table import falls_freely, has_inertias
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.butterworth import butterworth_smoother, is_evenly_sampled
 from airborne.motion.smoothing.rotations import SmoothedRotations, smooth_rotations
 from airborne.motion.smoothing.segments import finite_rows
 from airborne.types import Array
 
-_MOST_SD_M_S2 = 2.5  # of a flight's fitted gravity: more tells nothing of whether it is free, as in `flight.fall`
-_FEWEST = 12  # frames of a flight, twice the numbers that are fitted
 # of the joints' low-pass: trunks hardly move, but are tracked to and fro against the pelvis. Chosen on synthetic
 # somersaults 71 and 72, arms and pikes: with 2 Hz of all, angular velocities err by 30 to 55 % of the tracked ones,
 # so by 22 to 47 %, with 2 to 4 Hz of the limbs alike
-_TRUNK, _TRUNK_HZ, _LIMB_HZ = ("torso", "chest", "head", "shoulder_left", "shoulder_right"), 1.0, 4.0
+TRUNK, _TRUNK_HZ, _LIMB_HZ = ("torso", "chest", "head", "shoulder_left", "shoulder_right"), 1.0, 4.0
 _TRACKED_SD_RAD = np.radians(5.0)  # of tracked orientations; further ones count less: of the same somersaults 2 to 3
 _MOST_OFF = 1.5  # median distance of tracked orientations from a flight's, in these sds; the same have up to 0.8
 _LONGEST_GAP_S = 0.5  # in a stretch, beyond any that may be filled
@@ -77,11 +74,7 @@ def _flights(rotations: SmoothedRotations, motion: Motion, model: BodyModel) -> 
     for rows in np.split(np.arange(len(label)), np.flatnonzero(np.diff(label)) + 1):
         posed, time_s = rows[motion.has_pose[rows]], motion.time_s[rows]
         is_even = is_evenly_sampled(time_s) and np.diff(time_s).max() < 1 / (2 * _LIMB_HZ)
-        if len(posed) < _FEWEST or label[rows[0]] < 0 or not is_even:
-            continue
-        com = np.array([centre_of_mass(model.with_pose(motion.pose(row)))[0] for row in posed])
-        fall = fit_fall(motion.time_s[posed], com, motion.R[posed])
-        if fall.is_free and fall.gravity_sd_m_s2 < _MOST_SD_M_S2:
+        if label[rows[0]] >= 0 and is_even and falls_freely(motion, model, posed):
             yield slice(int(rows[0]), int(rows[-1]) + 1)
 
 
@@ -90,7 +83,7 @@ def _smooth_joints(motion: Motion, rows: slice) -> tuple[Array, Array]:
     unknown = np.full(rows.stop - rows.start, np.nan)
     joints = []
     for name, angles in zip(motion.joints, motion.joint_angles[rows].swapaxes(0, 1), strict=True):
-        smooth = partial(butterworth_smoother, cutoff_hz=_TRUNK_HZ if name in _TRUNK else _LIMB_HZ)
+        smooth = partial(butterworth_smoother, cutoff_hz=_TRUNK_HZ if name in TRUNK else _LIMB_HZ)
         R = matrix_from_angles(angles)
         joints.append(smooth_rotations(smooth, motion.time_s[rows], R, unknown, fill_s=_LONGEST_GAP_S))
     R = np.stack([joint.R for joint in joints], axis=1)

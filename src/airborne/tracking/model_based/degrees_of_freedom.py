@@ -87,7 +87,7 @@ class DegreesOfFreedom:
         """
         if not self.moves_joints and prior is None:
             return np.linalg.solve(H + np.diag(self._damping), g)
-        of_prior = _linearise_prior(self, pose, prior)
+        of_prior = linearise_prior(self, pose, prior)
         H, g = H + np.diag(self._damping) + of_prior.H, g + of_prior.g
         delta = np.linalg.solve(H, g)
         for _ in range(_LIMIT_ROUNDS):
@@ -99,7 +99,7 @@ class DegreesOfFreedom:
 
     def prior_cost(self, pose: Pose, prior: PosePrior | None) -> float:
         """Return minus the log prior: half the squared distances, in sds, beyond the possible and to the expected."""
-        return _linearise_prior(self, pose, prior).cost if self.moves_joints or prior is not None else 0.0
+        return linearise_prior(self, pose, prior).cost if self.moves_joints or prior is not None else 0.0
 
     def rest_residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return how far limited joints are from the zero pose, in half ranges: rows (k, d), values (k,)."""
@@ -144,7 +144,7 @@ class DegreesOfFreedom:
         return rows[:, self.columns] / _LIMIT_SD_RAD, targets / _LIMIT_SD_RAD
 
 
-class _LinearPrior(NamedTuple):
+class LinearPrior(NamedTuple):
     """A prior about a pose, to second order: minus its logarithm there, and the normal equations of a step."""
 
     cost: float
@@ -153,8 +153,8 @@ class _LinearPrior(NamedTuple):
 
 
 @lru_cache(maxsize=8)  # a descent asks for the cost of a pose, and then for the step from it
-def _linearise_prior(dofs: DegreesOfFreedom, pose: Pose, prior: PosePrior | None) -> _LinearPrior:
-    """Linearise what is possible and what is expected; joints' limits, which are walls, add to the cost alone."""
+def linearise_prior(dofs: DegreesOfFreedom, pose: Pose, prior: PosePrior | None) -> LinearPrior:
+    """Linearise what is possible and what a prior expects; joints' limits, which are walls, add to the cost alone."""
     d = len(dofs.columns)
     cost, residuals, precision, g = 0.0, [], np.zeros(d), np.zeros(d)
     if dofs.moves_joints:
@@ -175,7 +175,7 @@ def _linearise_prior(dofs: DegreesOfFreedom, pose: Pose, prior: PosePrior | None
         if not len(values):
             continue
         cost, H, g = cost + 0.5 * float(values @ values), H + rows.T @ rows, g - rows.T @ values
-    return _LinearPrior(cost, H, g)
+    return LinearPrior(cost, H, g)
 
 
 class _JointPlaces(NamedTuple):

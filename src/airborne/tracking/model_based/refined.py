@@ -31,6 +31,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
 from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
+from airborne.tracking.model_based.image_evidence import ImageEvidence, image_evidence
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.limb_revision import follow_back
@@ -139,6 +140,10 @@ class RefinedTracker:
         frames = self.reduce_frames(frames)
         learned = regions_near(self._fitter, poses, frames, state.appearance)
         return self._fitter.weigh(poses, learned) if learned.masks.regions else np.zeros(len(poses))
+
+    def linearise(self, state: RefinedState, frames: Frames, pose: Pose, misfit: float | None = None) -> ImageEvidence:
+        """Return what the images say about a pose, without any prediction; see `image_evidence`."""
+        return image_evidence(self.render_model, pose, self.reduce_frames(frames), state.appearance, misfit=misfit)
 
     def revise(self, records: Sequence[FrameRecord], state: RefinedState) -> dict[int, Estimate]:
         """Return better estimates of earlier records, where limbs that the newest moved have been by then."""

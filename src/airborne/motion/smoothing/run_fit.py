@@ -1,0 +1,165 @@
+"""The most probable motion: a whole run fitted at once to its images and to how bodies move.
+
+The poses of all frames are unknown together. Each frame's images are evidence about its own pose; between frames the
+accelerations of the root and of every joint are white noise, and in flight the centre of mass falls freely. Each
+Gauss-Newton step linearises both anew, about all poses of the run, and solves one banded system. So a frame is fitted
+with what the images before and after it show, and no image counts twice, as it does through a tracker's predictions.
+Batch estimation: Barfoot 2017, "State Estimation for Robotics", sections 3.1 and 4.3; white accelerations: Bar-Shalom,
+Li and Kirubarajan 2001, "Estimation with Applications to Tracking and Navigation", section 6.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from airborne.body import BodyModel, Pose
+from airborne.body.chain import delta_between, move_pose
+from airborne.constants import FREE_FALL_M_S2
+from airborne.geometry.banded_equations import BandedEquations, JoiningRows
+from airborne.geometry.descent import BacktrackingRule, descend
+from airborne.motion.flight.fall import fit_fall
+from airborne.motion.flight.momentum import centre_of_mass
+from airborne.motion.smoothing.free_rotation import TRUNK
+from airborne.tracking.model_based.image_evidence import ImageEvidence
+from airborne.types import Array
+
+Look = Callable[[Sequence[Pose]], Sequence[ImageEvidence]]  # one pass over the images of a run, a pose each frame
+
+# spectral densities of accelerations [m2/s3, rad2/s3]: of root and limbs an sd of 30 m/s2 and rad/s2 at 50 frames/s, of
+# 15, 20, 30 and 60 that with the least errors of joints on synthetic somersaults
+_DENSITY = 30.0**2 / 50
+_TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: with 30 rad/s2 joints err by 0.7 % more; with 5 the largest do
+# [m2/s3] of the centre of mass's in flight, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2 the least errors
+# of the same, four of them tracked with bodies of other lengths and girths
+_FALL_DENSITY = 0.3**2 / 50
+_DAMPING = 1e-4  # [1/m2, 1/rad2] holds what neither images nor neighbours show
+N_STEPS = 4  # on seven synthetic somersaults errors fall up to the fourth; further steps fit what images have wrong
+_SHORTER, _LEAST_SHARE = 0.4, 0.1  # factor on a step that does not lower the cost, and the least share of one
+_SLACK = 3e-3  # of the cost: the refitted light makes it fluctuate by up to 2e-3 on synthetic somersaults
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Frames between which motion is smooth, three or more, and whether the body falls freely there: then four."""
+
+    rows: slice
+    falls: bool
+
+
+def fit_run(
+    model: BodyModel, poses: Sequence[Pose], time_s: Array, stretches: Sequence[Stretch], look: Look
+) -> list[Pose]:
+    """Return the most probable poses at the times (n,) [s], from poses near them; outside of stretches they stay."""
+
+    def evaluate(poses: Sequence[Pose]) -> _Iterate:
+        return _Iterate(model, poses, time_s, stretches, look(poses))
+
+    rule = BacktrackingRule(_SHORTER, _LEAST_SHARE)
+    return list(descend(evaluate(poses), evaluate, rule, most_steps=N_STEPS, slack=_SLACK).best.poses)
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """All poses of a run, and what the images say about them."""
+
+    model: BodyModel
+    poses: Sequence[Pose]
+    time_s: Array  # (n,)
+    stretches: Sequence[Stretch]
+    evidence: Sequence[ImageEvidence]
+
+    @cached_property
+    def _joining(self) -> list[list[JoiningRows]]:
+        """What joins the frames of each stretch."""
+        joining = []
+        for stretch in self.stretches:
+            poses, time_s = self.poses[stretch.rows], self.time_s[stretch.rows]
+            gravity_m_s2 = FREE_FALL_M_S2 if stretch.falls else np.zeros(3)
+            joining.append([acceleration_rows(self.model, poses, time_s, gravity_m_s2)])
+            if stretch.falls:
+                offset_m = fall_offset_m(self.model, poses, time_s)
+                joining[-1].append(fall_rows(self.model, poses, time_s, offset_m))
+        return joining
+
+    def cost(self, reference: _Iterate) -> float:
+        """Return minus the log-posterior [nat]."""
+        of_motion = sum(float(np.sum(each.values**2)) for joining in self._joining for each in joining) / 2
+        return of_motion + sum(each.cost for stretch in self.stretches for each in self.evidence[stretch.rows])
+
+    @cached_property
+    def _step(self) -> tuple[Array, float]:
+        """The whole step, deltas (n, d), and the decrease of the cost that it predicts [nat]."""
+        deltas, predicted = np.zeros((len(self.poses), self.model.n_dofs)), 0.0
+        for stretch, joining in zip(self.stretches, self._joining, strict=True):
+            evidence = self.evidence[stretch.rows]
+            own = np.array([each.information for each in evidence]) + _DAMPING * np.eye(self.model.n_dofs)
+            equations = BandedEquations.of(own, np.array([each.gradient for each in evidence]), *joining)
+            deltas[stretch.rows] = x = equations.solve()
+            predicted += 0.5 * float(np.sum(equations.right * x))
+        return deltas, predicted
+
+    def step(self, share: float) -> tuple[Sequence[Pose], float]:
+        """Return the poses after a share of the step, and the decrease that the whole one predicts."""
+        (deltas, predicted), moved = self._step, list(self.poses)
+        for stretch in self.stretches:
+            pairs = zip(self.poses[stretch.rows], deltas[stretch.rows], strict=True)
+            moved[stretch.rows] = [move_pose(pose, share * x) for pose, x in pairs]
+        return moved, predicted
+
+
+def acceleration_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, gravity_m_s2: Array) -> JoiningRows:
+    """Return the second derivatives of the poses (n,), less gravity (3,): in sds, each group of three by itself.
+
+    To first order a change of the later of two poses changes the delta between them as much; a change of the earlier
+    one, seen from the later, by minus as much, turned with it.
+    """
+    step_s, n_groups = np.diff(time_s), model.n_dofs // 3  # of the root's position, its rotation, each joint's
+    rate, turn = np.zeros((len(step_s), n_groups, 3)), np.zeros((len(step_s), n_groups, 3, 3))
+    for i, dt_s in enumerate(step_s):
+        delta = delta_between(poses[i], poses[i + 1]).reshape(n_groups, 3)
+        turned = delta * np.where(np.arange(n_groups) == 1, 1, -1)[:, None]  # a joint's axes turn with its segment
+        turned[0] = 0
+        rate[i], turn[i] = delta / dt_s, Rotation.from_rotvec(turned).as_matrix()
+    between_s = (step_s[1:] + step_s[:-1])[:, None] / 2
+    before, after = between_s * step_s[:-1, None], between_s * step_s[1:, None]
+    rows = np.zeros((len(between_s), n_groups, 3, 3, 3))
+    rows[:, :, :, 0] = turn[:-1] / before[..., None, None]
+    rows[:, :, :, 1] = -turn[1:] / after[..., None, None] - np.eye(3) / before[..., None, None]
+    rows[:, :, :, 2] = np.eye(3) / after[..., None, None]
+    values = np.diff(rate, axis=0) / between_s[..., None]
+    values[:, 0] -= gravity_m_s2
+    is_trunk = [False] * 2 + [segment.name in TRUNK for segment in model.segments[1:]]
+    sd = np.sqrt(np.where(is_trunk, _TRUNK_DENSITY, _DENSITY) / between_s)
+    return JoiningRows(rows / sd[..., None, None, None], values / sd[..., None])
+
+
+def fall_offset_m(model: BodyModel, poses: Sequence[Pose], time_s: Array) -> Array:
+    """Return by what the centre of mass lies beside the body's, in the root's frame, to fall as it does: (3,) [m].
+
+    The body's masses are not quite the person's; see `fit_fall`.
+    """
+    place = np.array([centre_of_mass(model.with_pose(pose))[0] for pose in poses])
+    return fit_fall(time_s, place, np.array([pose.world_from_root.rotation.as_matrix() for pose in poses])).offset_m
+
+
+def fall_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, offset_m: Array) -> JoiningRows:
+    """Return how far the acceleration of the centre of mass is from gravity: in sds, three of each three frames.
+
+    It lies by an offset (3,) in the root's frame beside that of the body.
+    """
+    centres = [centre_of_mass(model.with_pose(pose)) for pose in poses]
+    offsets = np.array([pose.world_from_root.rotation.apply(offset_m) for pose in poses])
+    place, slope = np.array([each[0] for each in centres]) + offsets, np.array([each[1] for each in centres])
+    slope[:, :, 3:6] -= np.cross(offsets[:, None], np.eye(3)).swapaxes(1, 2)  # w x offset
+    before_s, after_s = np.diff(time_s)[:-1], np.diff(time_s)[1:]
+    between_s, n = (before_s + after_s) / 2, len(before_s)
+    weights = np.stack([1 / before_s, -1 / before_s - 1 / after_s, 1 / after_s], axis=1) / between_s[:, None]
+    values = sum(weights[:, j, None] * place[j : n + j] for j in range(3)) - FREE_FALL_M_S2
+    rows = np.stack([weights[:, j, None, None] * slope[j : n + j] for j in range(3)], axis=2)
+    sd = np.sqrt(_FALL_DENSITY / between_s)[:, None, None]
+    return JoiningRows(rows[:, None] / sd[..., None, None], values[:, None] / sd)

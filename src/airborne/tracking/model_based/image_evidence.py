@@ -1,0 +1,54 @@
+"""What the images of one time say about a pose by themselves: no pose is predicted from other times.
+
+A fit of a whole run joins such evidence of all its frames with its own model of the motion; a prediction would count
+the same images again and again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from airborne.appearance.model import Appearance
+from airborne.body import Pose
+from airborne.tracking.image_regions import crop_regions
+from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints, linearise_prior
+from airborne.tracking.model_based.gauss_newton import linearise_images
+from airborne.tracking.model_based.later_frames import MARGIN_PX
+from airborne.tracking.model_based.learning import learn_missing_backgrounds
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
+from airborne.video import Frames
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageEvidence:
+    """Minus the log-posterior of a pose moved by a delta x (d,): cost - gradient x + x information x / 2 [nat].
+
+    It is that of the images and of what is possible for a body: its joints' ranges, its segments beside one another.
+    """
+
+    information: Array  # (d, d)
+    gradient: Array  # (d,)
+    cost: float  # [nat]
+    misfit: float  # variance of the images' residual, by which they are weighed
+
+
+def image_evidence(
+    render_model: RenderModel, pose: Pose, frames: Frames, appearance: Appearance, *, misfit: float | None = None
+) -> ImageEvidence:
+    """Linearise the images about a pose; None where they are weighed by the misfit that they show there.
+
+    Costs of several poses can be compared if their misfit is the same.
+    """
+    posed, dofs = render_model.with_pose(pose), all_joints(render_model.model)
+    regions = crop_regions([posed], render_model.geometry, frames, MARGIN_PX)
+    regions = [region for region in regions if appearance.has_colours(region)]
+    appearance = learn_missing_backgrounds(render_model, posed, regions, appearance)
+    images = linearise_images(render_model, pose, regions, appearance, dofs=dofs)
+    possible = linearise_prior(dofs, pose, PosePrior(pose, np.full(len(dofs.columns), np.inf)))
+    misfit = max(images.misfit, 1e-9) if misfit is None else misfit
+    return ImageEvidence(
+        images.A / misfit + possible.H, images.g / misfit + possible.g, images.objective(misfit, possible.cost), misfit
+    )
