@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose
+from airborne.tracking.image_regions import narrow_regions
 from airborne.tracking.model_based.degrees_of_freedom import (
     DegreesOfFreedom,
     PosePrior,
@@ -56,6 +57,7 @@ LOST_NATS = 10.0
 _N_FITTED = 3  # places of a limb that are fitted to the images
 _BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
+_FIT_MARGIN_PX = 12  # of a full frame: the blur's radius, and how far images move a body beyond its silhouettes
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
 
@@ -143,7 +145,7 @@ class Fitter:
 
     def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Fit the images from several poses; return the best fit."""
-        views = self._views(poses[0], learned)
+        views = self._views(poses, learned)
         *before, last = self.stages if self.order == "hierarchical" else self.stages[-1:]
         for dofs in before:
             poses = [fit_images(self.render_model, poses, views, dofs=dofs, prior=prior).pose]
@@ -151,7 +153,7 @@ class Fitter:
 
     def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
         """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
-        views = self._views(poses[0], learned)
+        views = self._views(poses, learned)
         evaluate, _ = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])
         equations = [evaluate(pose, True) for pose in poses]
         noise = min(each.noise for each in equations)
@@ -186,12 +188,15 @@ class Fitter:
         evidence = self.agreement(fit.equations.pose, learned).evidence
         return fit.objective(misfit, prior) - evidence / fit.equations.shared
 
-    def _views(self, pose: Pose, learned: LearnedRegions) -> list[ImageView]:
-        """Prepare the images, with a background in every region, for a fit."""
-        posed = self.render_model.with_pose(pose)
-        appearance = learn_missing_backgrounds(self.render_model, posed, learned.masks.regions, learned.appearance)
+    def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
+        """Prepare the images around a body in several poses, with a background in every region, for a fit."""
+        bodies = [self.render_model.with_pose(pose) for pose in poses]
+        appearance = learn_missing_backgrounds(self.render_model, bodies[0], learned.masks.regions, learned.appearance)
         if appearance not in learned.prepared:
-            learned.prepared[appearance] = image_views(self.render_model, learned.masks.regions, appearance)
+            regions = learned.masks.regions
+            if not self.moves_joints:
+                regions = narrow_regions(regions, bodies, self.render_model.geometry, _FIT_MARGIN_PX)
+            learned.prepared[appearance] = image_views(self.render_model, regions, appearance)
         return [view.with_own_light() for view in learned.prepared[appearance]]
 
     def _refit_limbs(
