@@ -34,7 +34,7 @@ from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegio
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.limb_revision import follow_back
-from airborne.tracking.model_based.recovery import recover
+from airborne.tracking.model_based.recovery import is_same, recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, status_of
 from airborne.tracking.model_based.support import mark_unobserved, widen_unseen
@@ -188,7 +188,13 @@ class RefinedTracker:
         found = fit_next(*args, reference=state.reference, prior=prior)
         if found is not None and not found.agreement.is_suspect(state.reference):
             return found
-        suspect = None if found is None or found.agreement.is_poor(state.reference) else found.fit.pose
+        suspect = None
+        if found is not None:
+            is_poor = found.agreement.is_poor(state.reference)
+            is_expected = any(is_same(found.fit.pose, pose) for pose in predicted)
+            if is_expected and not is_poor:
+                return found
+            suspect = found.fit.pose if is_expected or not is_poor else None
         recovered = recover(*args, gap_s=gap_s, suspect=suspect)
         if found is None or recovered is None:
             return found or recovered
