@@ -45,6 +45,9 @@ from airborne.video import Frames
 _MOST_PX_PER_M = 220.0  # of a body with joints
 _HISTORY = 3  # poses that predict
 _OBSERVED_SD_RAD, _UNOBSERVED_VARIANCE = 0.1, 1e6  # a rotation with a larger sd than this is hardly extrapolated
+# share of the reference's precision and recall from which colours and backgrounds are learned in turns; if they always
+# are, light that doubles within twelve frames is lost
+_STEADY = 0.98
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 
 PREDICTIONS: dict[str, tuple[Callable[[predictors.PoseHistory, Fraction], Pose], ...]] = {
@@ -64,6 +67,7 @@ class RefinedState:
     appearance: Appearance = field(default_factory=Appearance)
     reference: Reference = field(default_factory=Reference)
     covariance: Array | None = None  # of the last estimated pose
+    n_learned: int = 0  # from how many frames was learned
 
 
 class RefinedTracker:
@@ -122,13 +126,23 @@ class RefinedTracker:
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
         motion = self._motion(before, frames)
-        appearance = learn_appearance(self.render_model, estimate.pose, regions, state.appearance, motion=motion)
+        is_steady = bool(state.past) and state.reference.is_met(estimate.mask_shares, _STEADY)
+        turn = state.n_learned // 2 % 2  # twice each: the two backgrounds of fields take turns, too
+        appearance = learn_appearance(
+            self.render_model,
+            estimate.pose,
+            regions,
+            state.appearance,
+            motion=motion,
+            colours=turn == 1 or not is_steady,
+            backgrounds=turn == 0 or not is_steady,
+        )
         reference = state.reference
         if state.past and estimate.mask_shares is not None:
             reference = reference.update(*estimate.mask_shares)
         elif (learned := LearnedRegions.of(regions, appearance)).masks.regions:  # nothing was known of colours before
             reference = reference.update(*self._fitter.agreement(estimate.pose, learned).shares)
-        return RefinedState(past, appearance, reference, estimate.covariance)
+        return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1)
 
     def turn(self, state: RefinedState) -> RefinedState:
         """Return the state from which the body is tracked back in time: the past is as it would be met then."""
