@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose
-from airborne.tracking.image_regions import narrow_regions
 from airborne.tracking.model_based.degrees_of_freedom import (
     DegreesOfFreedom,
     PosePrior,
@@ -25,15 +23,13 @@ from airborne.tracking.model_based.gauss_newton import (
     NEAR,
     Fit,
     ImageView,
-    Posteriors,
     PyramidLevels,
     fit_images,
     fit_silhouettes,
     image_evaluator,
-    image_views,
 )
 from airborne.tracking.model_based.global_search import region_evidence
-from airborne.tracking.model_based.learning import learn_missing_backgrounds
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import (
     DISTINCT_M,
@@ -57,29 +53,7 @@ LOST_NATS = 10.0
 _N_FITTED = 3  # places of a limb that are fitted to the images
 _BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
-_FIT_MARGIN_PX = 12  # of a full frame: the blur's radius, and how far images move a body beyond its silhouettes
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LearnedRegions:
-    """The regions of one time whose colours have been learned."""
-
-    masks: Posteriors
-    appearance: Appearance
-    # images prepared by an appearance: where a limb is looked for, they are fitted again and again
-    prepared: dict[Appearance, Sequence[ImageView]] = field(default_factory=dict)
-
-    @property
-    def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
-        """The regions and each pixel's probability (h, w) to be body."""
-        return self.masks.regions, self.masks.planes
-
-    @classmethod
-    def of(cls, regions: Sequence[Region], appearance: Appearance) -> LearnedRegions:
-        """Take those of the regions whose colours have been learned."""
-        learned = [region for region in regions if appearance.has_colours(region)]
-        return cls(Posteriors(learned, [appearance.posterior(region) for region in learned]), appearance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +128,7 @@ class Fitter:
     def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
         """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
         views = self._views(poses, learned)
-        evaluate, _ = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])
+        evaluate = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])[0]
         equations = [evaluate(pose, True) for pose in poses]
         noise = min(each.noise for each in equations)
         return np.array([each.objective(noise, 0.0) for each in equations])
@@ -189,15 +163,8 @@ class Fitter:
         return fit.objective(misfit, prior) - evidence / fit.equations.shared
 
     def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
-        """Prepare the images around a body in several poses, with a background in every region, for a fit."""
         bodies = [self.render_model.with_pose(pose) for pose in poses]
-        appearance = learn_missing_backgrounds(self.render_model, bodies[0], learned.masks.regions, learned.appearance)
-        if appearance not in learned.prepared:
-            regions = learned.masks.regions
-            if not self.moves_joints:
-                regions = narrow_regions(regions, bodies, self.render_model.geometry, _FIT_MARGIN_PX)
-            learned.prepared[appearance] = image_views(self.render_model, regions, appearance)
-        return [view.with_own_light() for view in learned.prepared[appearance]]
+        return learned.image_views(self.render_model, bodies, are_narrow=not self.moves_joints)
 
     def _refit_limbs(
         self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
@@ -290,8 +257,9 @@ class Fitter:
         return (others[best], widened) if costs[best] < stays else (fit, prior)
 
     def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
-        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
-        pixels, beside_m2 = find_uncovered(self.render_model, self.render_model.with_pose(fit.pose), *learned.views)
+        model = self.render_model
+        misplaced = find_misplaced_limbs(model, fit.pose, *learned.views)
+        pixels, beside_m2 = find_uncovered(model, model.with_pose(fit.pose), *learned.views)
         of_limb = ((limb, beside_m2[:, limb].sum(axis=1)) for limb in limbs_of(self.model))
         beside = [limb for limb, areas_m2 in of_limb if np.sum(areas_m2 > _BESIDE_M2) >= _FEWEST_VIEWS]
         return _MaskFaults(fit, misplaced, beside, sum(bool(each.any()) for each in pixels))

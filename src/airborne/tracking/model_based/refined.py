@@ -30,8 +30,9 @@ from airborne.tracking.model_based.degrees_of_freedom import (
 )
 from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
-from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
+from airborne.tracking.model_based.fitter import Fitter, JudgedFit, Order
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.limb_revision import follow_back
 from airborne.tracking.model_based.recovery import is_same, recover
