@@ -22,21 +22,16 @@ def fit_first(fitter: Fitter, start: Pose, frames: Frames, prior: PosePrior | No
     """Fit from a pose set by hand, and from the same with limbs swapped; None where no view shows it."""
     render_model = fitter.render_model
     regions = crop_regions([render_model.with_pose(start)], render_model.geometry, frames, _MARGIN_PX)
-    appearance, corrected = _learn_first_colours(fitter, start, regions, prior)
-    learned = LearnedRegions.of(regions, appearance)
+    learned = LearnedRegions.of(regions, _learn_first_colours(fitter, start, regions, prior))
     if not learned.masks.regions:
         return None
-    # a body with joints was lost more often from where the colours were learned
-    starts, levels = ((start, *fitter.swap_limbs(start)), FAR) if fitter.moves_joints else ((corrected,), FAR[-1:])
-    poses = [fitter.fit_silhouettes(pose, learned, levels, prior) for pose in starts]
+    poses = [fitter.fit_silhouettes(pose, learned, FAR, prior) for pose in (start, *fitter.swap_limbs(start))]
     fit = fitter.fit_images([*poses, *fitter.swap_limbs(poses[0])], learned, prior)
     return fitter.judge(fit, [start], learned, prior)
 
 
-def _learn_first_colours(
-    fitter: Fitter, pose: Pose, regions: Sequence[Region], prior: PosePrior | None
-) -> tuple[Appearance, Pose]:
-    """Learn the colours from a pose set by hand, correct the pose by them, and learn them again; return both.
+def _learn_first_colours(fitter: Fitter, pose: Pose, regions: Sequence[Region], prior: PosePrior | None) -> Appearance:
+    """Learn the colours from a pose set by hand, correct the pose by them, and learn them again.
 
     The first time, pixels of the mask that are more like the background than like the body's own colours are left
     out: the pose may be wrong by more than the body's width.
@@ -50,4 +45,4 @@ def _learn_first_colours(
             part = render_model.draw_parts(posed, region)
             body = body_like(region.rgb, part, render_model.geometry.colours) if number == 0 else None
             appearance = appearance.learn_colours(region, part >= 0, body=body)
-    return appearance, pose
+    return appearance
