@@ -41,12 +41,11 @@ class LearnedRegions:
     ) -> list[ImageView]:
         """Prepare the images for a fit that starts from several poses, with a background in every region.
 
-        are_narrow: only of the parts that hold these poses; costs are then compared with none of another fit's. Where
-        an exposure is known, the whole regions are taken: they hold the body's motion in it.
+        are_narrow: only of the parts that hold these poses; costs are then compared with none of another fit's.
         """
         regions = self.masks.regions
         appearance = learn_missing_backgrounds(render_model, bodies[0], regions, self.appearance)
-        if are_narrow and not any(region.exposure_s for region in regions):
+        if are_narrow:
             return image_views(
                 render_model, narrow_regions(regions, bodies, render_model.geometry, _MARGIN_PX), appearance
             )
