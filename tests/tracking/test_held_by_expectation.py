@@ -8,8 +8,9 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.tracking.model_based import gauss_newton
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
-from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
+from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.turned_pelvis import turn_pelvis
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import LearnedFrame

@@ -5,7 +5,7 @@ import pytest
 
 from airborne.body import surface_arrays
 from airborne.rendering import FLAT, render
-from airborne.tracking.image_regions import bounding_points, crop_regions
+from airborne.tracking.image_regions import bounding_points, crop_regions, narrow_regions
 from airborne.video import Frames, View
 from tests.support.scenes import CROSS, Scene
 from tests.support.tolerances import ROUNDTRIP
@@ -32,6 +32,25 @@ def test_region_is_a_crop_whose_camera_sees_the_same_points_at_the_same_pixels()
         here, there = region.camera.px_from_world(points), view.camera.px_from_world(points)
         np.testing.assert_allclose(here + region.corner, there, atol=ROUNDTRIP)
         assert region.source[0] == view.camera.name
+
+
+def test_narrowed_region_is_a_crop_of_the_region_that_holds_the_body_and_the_margin():
+    body, margin_px = posed_cross(), 12
+    wide = regions(posed_cross(0), posed_cross(6))
+    for region, narrow in zip(wide, narrow_regions(wide, [body], FLAT_CROSS, margin_px), strict=True):
+        assert narrow.rgb.size < region.rgb.size
+        np.testing.assert_array_equal(narrow.rgb, narrow.crop(region.view_rgb))
+        px, there = (each.camera.px_from_world(bounding_points(body, FLAT_CROSS)) for each in (narrow, region))
+        np.testing.assert_allclose(px + narrow.corner, there + region.corner, atol=ROUNDTRIP)
+        assert np.all(px.min(axis=0) >= margin_px)
+        assert np.all(px.max(axis=0) <= np.array(narrow.camera.size) - 1 - margin_px)
+
+
+def test_region_that_shows_none_of_the_bodies_stays():
+    wide = regions(posed_cross())
+    behind = CROSS.with_pose(SCENE.start().move(np.array([0, -30.0, 0]), np.zeros(3)))
+    narrowed = narrow_regions(wide[:1], [behind], FLAT_CROSS, 12)
+    assert narrowed[0] is wide[0]
 
 
 def test_region_holds_every_pixel_of_every_body():

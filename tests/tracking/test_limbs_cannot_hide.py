@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of
-from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
+from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator, image_views
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
 from airborne.tracking.model_based.uncovered import find_uncovered
 from tests.support.people import HUMAN

@@ -10,9 +10,10 @@ from airborne.body import Pose
 from airborne.body.chain import clamp_to_limits
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, limb_of_segment
-from airborne.tracking.model_based.fitter import Fitter, LearnedRegions
+from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.global_search import region_evidence
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
 from tests.support.people import HUMAN, mean_errors_mm, person, tracker

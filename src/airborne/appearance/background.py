@@ -102,6 +102,18 @@ def update_background(rgb, covered, known):
 
 
 @kernel(fastmath=True)
+def certainty_of(sd, n_observations, out):
+    """Fill out (h, w) with each pixel's certainty, (START_SD / sd)^2 up to 1; return whether all were observed."""
+    h, w = sd.shape
+    one, start_variance, n_unknown = np.float32(1), np.float32(START_SD**2), 0
+    for y in range(h):
+        for x in range(w):
+            out[y, x] = min(one, start_variance / (sd[y, x] * sd[y, x]))
+            n_unknown += n_observations[y, x] <= 0
+    return n_unknown == 0
+
+
+@kernel(fastmath=True)
 def inpaint(mean, n_observations, out):
     """Copy mean (h, w, 3) to out and grow observed pixels into the others, ring by ring; False if none was observed."""
     h, w, _ = mean.shape

@@ -23,10 +23,10 @@ _SAME_FACE = 0.9  # cosine between neighbouring normals
 def light_planes(image, table, out):
     """Turn an image (h, w, 3), sRGB 0..255 of any type, into planes (3, h, w) by a table like `LIGHT_FROM_SRGB`."""
     h, w, _ = image.shape
-    for k in range(3):
-        for y in range(h):
+    for y in range(h):
+        for k in range(3):
             for x in range(w):
-                out[k, y, x] = table[int(image[y, x, k] * np.float32(1023 / 255) + np.float32(0.5))]
+                out[k, y, x] = table[np.uint32(np.float32(image[y, x, k]) * np.float32(1023 / 255) + np.float32(0.5))]
 
 
 @kernel(fastmath=True)

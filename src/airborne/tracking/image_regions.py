@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.appearance.model import Region
 from airborne.body import PosedBody, SurfaceArrays
+from airborne.cameras import Camera
 from airborne.kernels import kernel
 from airborne.rendering.packing import pack_view, shift_view
 from airborne.video import Frames, View
@@ -26,6 +27,14 @@ def crop_regions(
     points = np.concatenate([bounding_points(body, geometry) for body in bodies])
     regions = [_region(view, points, margin_px) for view in frames.views if view is not None]
     return [region for region in regions if region is not None]
+
+
+def narrow_regions(
+    regions: Sequence[Region], bodies: Sequence[PosedBody], geometry: SurfaceArrays, margin_px: float
+) -> list[Region]:
+    """Cut regions down to what holds the posed bodies and a margin; one that shows none stays as it is."""
+    points = np.concatenate([bounding_points(body, geometry) for body in bodies])
+    return [_narrow(region, points, margin_px) for region in regions]
 
 
 def reduce_frames(frames: Frames, body: PosedBody, most_px_per_m: float) -> Frames:
@@ -114,18 +123,15 @@ def _project(points, view, K, width, height):
 
 def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
     camera, packed = view.camera, pack_view(view.camera)
-    left, top, right, bottom, _ = _project(points, packed, camera.K, *camera.size)
-    if left > right:
+    box = _box(points, packed, camera, margin_px)
+    if box is None:
         return None
-    margin_v = margin_px * camera.K[1, 1] / camera.K[0, 0]
-    x0, x1 = _span(left - margin_px, right + margin_px, camera.size[0])
-    y0, y1 = _span(top - margin_v, bottom + margin_v, camera.size[1])
+    x0, y0, x1, y1 = box
     width, height = ((end - begin) // _ROUND_TO_PX * _ROUND_TO_PX for begin, end in ((x0, x1), (y0, y1)))
     if min(width, height) < 2 * _ROUND_TO_PX:
         return None
-    own = camera.resample(scale=(1, 1), offset=(x0, y0), size=(width, height))
     return Region(
-        camera=own,
+        camera=camera.resample(scale=(1, 1), offset=(x0, y0), size=(width, height)),
         corner=(x0, y0),
         rgb=np.ascontiguousarray(view.rgb[y0 : y0 + height, x0 : x0 + width]),
         view_rgb=view.rgb,
@@ -133,6 +139,33 @@ def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
         packed_view=shift_view(packed, x0, y0),
         exposure_s=view.exposure_s,
     )
+
+
+def _narrow(region: Region, points: NDArray, margin_px: float) -> Region:
+    box = _box(points, region.packed_view, region.camera, margin_px)
+    if box is None or min(box[2] - box[0], box[3] - box[1]) < 2 * _ROUND_TO_PX:
+        return region
+    x0, y0, x1, y1 = box
+    return replace(
+        region,
+        camera=region.camera.resample(scale=(1, 1), offset=(x0, y0), size=(x1 - x0, y1 - y0)),
+        corner=(region.corner[0] + x0, region.corner[1] + y0),
+        rgb=np.ascontiguousarray(region.rgb[y0:y1, x0:x1]),
+        packed_view=shift_view(region.packed_view, x0, y0),
+    )
+
+
+def _box(
+    points: NDArray, packed: NDArray[np.float64], camera: Camera, margin_px: float
+) -> tuple[int, int, int, int] | None:
+    """Return the part x0 <= x < x1, y0 <= y < y1 of an image that holds points and a margin; None if all are behind."""
+    left, top, right, bottom, _ = _project(points, packed, camera.K, *camera.size)
+    if left > right:
+        return None
+    margin_v = margin_px * camera.K[1, 1] / camera.K[0, 0]
+    x0, x1 = _span(left - margin_px, right + margin_px, camera.size[0])
+    y0, y1 = _span(top - margin_v, bottom + margin_v, camera.size[1])
+    return x0, y0, x1, y1
 
 
 def _span(low: float, high: float, size: int) -> tuple[int, int]:

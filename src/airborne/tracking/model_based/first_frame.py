@@ -9,8 +9,9 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
-from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions
+from airborne.tracking.model_based.fitter import Fitter, JudgedFit
 from airborne.tracking.model_based.gauss_newton import FAR
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.video import Frames
 
 _MARGIN_PX = 56  # of a full frame

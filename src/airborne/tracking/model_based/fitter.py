@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose
 from airborne.tracking.model_based.degrees_of_freedom import (
     DegreesOfFreedom,
@@ -24,15 +23,13 @@ from airborne.tracking.model_based.gauss_newton import (
     NEAR,
     Fit,
     ImageView,
-    Posteriors,
     PyramidLevels,
     fit_images,
     fit_silhouettes,
     image_evaluator,
-    image_views,
 )
 from airborne.tracking.model_based.global_search import region_evidence
-from airborne.tracking.model_based.learning import learn_missing_backgrounds
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import (
     DISTINCT_M,
@@ -57,27 +54,6 @@ _N_FITTED = 3  # places of a limb that are fitted to the images
 _BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LearnedRegions:
-    """The regions of one time whose colours have been learned."""
-
-    masks: Posteriors
-    appearance: Appearance
-    # images prepared by an appearance: where a limb is looked for, they are fitted again and again
-    prepared: dict[Appearance, Sequence[ImageView]] = field(default_factory=dict)
-
-    @property
-    def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
-        """The regions and each pixel's probability (h, w) to be body."""
-        return self.masks.regions, self.masks.planes
-
-    @classmethod
-    def of(cls, regions: Sequence[Region], appearance: Appearance) -> LearnedRegions:
-        """Take those of the regions whose colours have been learned."""
-        learned = [region for region in regions if appearance.has_colours(region)]
-        return cls(Posteriors(learned, [appearance.posterior(region) for region in learned]), appearance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,7 +119,7 @@ class Fitter:
 
     def fit_images(self, poses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> Fit:
         """Fit the images from several poses; return the best fit."""
-        views = self._views(poses[0], learned)
+        views = self._views(poses, learned)
         *before, last = self.stages if self.order == "hierarchical" else self.stages[-1:]
         for dofs in before:
             poses = [fit_images(self.render_model, poses, views, dofs=dofs, prior=prior).pose]
@@ -151,8 +127,8 @@ class Fitter:
 
     def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
         """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
-        views = self._views(poses[0], learned)
-        evaluate, _ = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])
+        views = self._views(poses, learned)
+        evaluate = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])[0]
         equations = [evaluate(pose, True) for pose in poses]
         noise = min(each.noise for each in equations)
         return np.array([each.objective(noise, 0.0) for each in equations])
@@ -186,13 +162,9 @@ class Fitter:
         evidence = self.agreement(fit.equations.pose, learned).evidence
         return fit.objective(misfit, prior) - evidence / fit.equations.shared
 
-    def _views(self, pose: Pose, learned: LearnedRegions) -> list[ImageView]:
-        """Prepare the images, with a background in every region, for a fit."""
-        posed = self.render_model.with_pose(pose)
-        appearance = learn_missing_backgrounds(self.render_model, posed, learned.masks.regions, learned.appearance)
-        if appearance not in learned.prepared:
-            learned.prepared[appearance] = image_views(self.render_model, learned.masks.regions, appearance)
-        return [view.with_own_light() for view in learned.prepared[appearance]]
+    def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
+        bodies = [self.render_model.with_pose(pose) for pose in poses]
+        return learned.image_views(self.render_model, bodies, are_narrow=not self.moves_joints)
 
     def _refit_limbs(
         self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
@@ -285,8 +257,9 @@ class Fitter:
         return (others[best], widened) if costs[best] < stays else (fit, prior)
 
     def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
-        misplaced = find_misplaced_limbs(self.render_model, fit.pose, *learned.views)
-        pixels, beside_m2 = find_uncovered(self.render_model, self.render_model.with_pose(fit.pose), *learned.views)
+        model = self.render_model
+        misplaced = find_misplaced_limbs(model, fit.pose, *learned.views)
+        pixels, beside_m2 = find_uncovered(model, model.with_pose(fit.pose), *learned.views)
         of_limb = ((limb, beside_m2[:, limb].sum(axis=1)) for limb in limbs_of(self.model))
         beside = [limb for limb, areas_m2 in of_limb if np.sum(areas_m2 > _BESIDE_M2) >= _FEWEST_VIEWS]
         return _MaskFaults(fit, misplaced, beside, sum(bool(each.any()) for each in pixels))

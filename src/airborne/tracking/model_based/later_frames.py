@@ -8,8 +8,9 @@ from airborne.appearance.model import Appearance
 from airborne.body import Pose
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
-from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions
+from airborne.tracking.model_based.fitter import Fitter, JudgedFit
 from airborne.tracking.model_based.gauss_newton import CLOSE, CLOSE_JOINTED, NEAR
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import is_nearer
 from airborne.tracking.model_based.status import Reference
 from airborne.video import Frames

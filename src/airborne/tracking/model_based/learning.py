@@ -20,14 +20,22 @@ def learn_appearance(
     appearance: Appearance,
     *,
     motion: Extrapolation,
+    colours: bool = True,
+    backgrounds: bool = True,
 ) -> Appearance:
-    """Learn colours and backgrounds from regions that show a body: where it was all the time, and never."""
+    """Learn from regions that show a body: where it was all the time, and never.
+
+    Colours and backgrounds are learned where asked for, and where there are none yet.
+    """
     for region in regions:
         exposure = Exposure(region.exposure_s, region.packed_view, region.camera.K)
         bodies = bodies_in_exposure(render_model, pose, motion, exposure)
         masks = [_mask(render_model, body, region) for body in bodies]
         ever, always = np.logical_or.reduce(masks), np.logical_and.reduce(masks)
-        appearance = appearance.learn_colours(region, ever, body=always).learn_background(region, ever)
+        if colours or not appearance.has_colours(region):
+            appearance = appearance.learn_colours(region, ever, body=always)
+        if backgrounds or not appearance.has_background(region):
+            appearance = appearance.learn_background(region, ever)
     return appearance
 
 

@@ -18,9 +18,10 @@ from airborne.appearance.model import Appearance
 from airborne.body import Pose
 from airborne.tracking import predictors
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, joints_of
-from airborne.tracking.model_based.fitter import LOST_NATS, Fitter, LearnedRegions
+from airborne.tracking.model_based.fitter import LOST_NATS, Fitter
 from airborne.tracking.model_based.gauss_newton import NEAR, Fit, fit_silhouettes
 from airborne.tracking.model_based.later_frames import regions_near
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.misplaced_limbs import limb_distance, with_limb
 from airborne.video import Frames
 

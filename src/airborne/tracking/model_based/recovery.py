@@ -54,7 +54,7 @@ def recover(
         return fitter.agreement(pose, learned).evidence
 
     poses = [fitter.fit_silhouettes(pose, learned, NEAR, None) for pose in candidates[:_N_CONFIRM]]
-    if suspect is not None and all(_is_same(pose, suspect) for pose in poses):
+    if suspect is not None and all(is_same(pose, suspect) for pose in poses):
         return None
     poses += [fitter.fit_silhouettes(pose, learned, NEAR, None) for pose in candidates[_N_CONFIRM:]]
     best = sorted(poses, key=evidence, reverse=True)[:_N_FITTED]
@@ -62,7 +62,8 @@ def recover(
     return fitter.judge(fit, candidates, learned, None)
 
 
-def _is_same(pose: Pose, other: Pose) -> bool:
+def is_same(pose: Pose, other: Pose) -> bool:
+    """Whether two poses are the same as far as silhouettes and images of a right fit agree."""
     delta = delta_between(pose, other)
     rotations = np.linalg.norm(delta[3:].reshape(-1, 3), axis=1)
     return bool(np.linalg.norm(delta[:3]) < _SAME_M and np.all(rotations < _SAME_RAD))

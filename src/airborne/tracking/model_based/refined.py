@@ -30,12 +30,13 @@ from airborne.tracking.model_based.degrees_of_freedom import (
 )
 from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
-from airborne.tracking.model_based.fitter import Fitter, JudgedFit, LearnedRegions, Order
+from airborne.tracking.model_based.fitter import Fitter, JudgedFit, Order
 from airborne.tracking.model_based.image_evidence import ImageEvidence, image_evidence
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
+from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.limb_revision import follow_back
-from airborne.tracking.model_based.recovery import recover
+from airborne.tracking.model_based.recovery import is_same, recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, status_of
 from airborne.tracking.model_based.support import mark_unobserved, widen_unseen
@@ -46,6 +47,9 @@ from airborne.video import Frames
 _MOST_PX_PER_M = 220.0  # of a body with joints
 _HISTORY = 3  # poses that predict
 _OBSERVED_SD_RAD, _UNOBSERVED_VARIANCE = 0.1, 1e6  # a rotation with a larger sd than this is hardly extrapolated
+# share of the reference's precision and recall from which colours and backgrounds are learned in turns; if they always
+# are, light that doubles within twelve frames is lost
+_STEADY = 0.98
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 
 PREDICTIONS: dict[str, tuple[Callable[[predictors.PoseHistory, Fraction], Pose], ...]] = {
@@ -65,6 +69,7 @@ class RefinedState:
     appearance: Appearance = field(default_factory=Appearance)
     reference: Reference = field(default_factory=Reference)
     covariance: Array | None = None  # of the last estimated pose
+    n_learned: int = 0  # from how many frames was learned
 
 
 class RefinedTracker:
@@ -123,13 +128,23 @@ class RefinedTracker:
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
         motion = self._motion(before, frames)
-        appearance = learn_appearance(self.render_model, estimate.pose, regions, state.appearance, motion=motion)
+        is_steady = bool(state.past) and state.reference.is_met(estimate.mask_shares, _STEADY)
+        turn = state.n_learned // 2 % 2  # twice each: the two backgrounds of fields take turns, too
+        appearance = learn_appearance(
+            self.render_model,
+            estimate.pose,
+            regions,
+            state.appearance,
+            motion=motion,
+            colours=turn == 1 or not is_steady,
+            backgrounds=turn == 0 or not is_steady,
+        )
         reference = state.reference
         if state.past and estimate.mask_shares is not None:
             reference = reference.update(*estimate.mask_shares)
         elif (learned := LearnedRegions.of(regions, appearance)).masks.regions:  # nothing was known of colours before
             reference = reference.update(*self._fitter.agreement(estimate.pose, learned).shares)
-        return RefinedState(past, appearance, reference, estimate.covariance)
+        return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1)
 
     def turn(self, state: RefinedState) -> RefinedState:
         """Return the state from which the body is tracked back in time: the past is as it would be met then."""
@@ -193,7 +208,13 @@ class RefinedTracker:
         found = fit_next(*args, reference=state.reference, prior=prior)
         if found is not None and not found.agreement.is_suspect(state.reference):
             return found
-        suspect = None if found is None or found.agreement.is_poor(state.reference) else found.fit.pose
+        suspect = None
+        if found is not None:
+            is_poor = found.agreement.is_poor(state.reference)
+            is_expected = any(is_same(found.fit.pose, pose) for pose in predicted)
+            if is_expected and not is_poor:
+                return found
+            suspect = found.fit.pose if is_expected or not is_poor else None
         recovered = recover(*args, gap_s=gap_s, suspect=suspect)
         if found is None or recovered is None:
             return found or recovered

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.background import START_SD, inpaint
+from airborne.appearance.background import certainty_of, inpaint
 from airborne.appearance.lighting import LIGHT_FROM_SRGB, LIGHT_TERMS, light_planes
 from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays, has_flat_sides, surface_arrays
@@ -137,14 +137,16 @@ class ViewBuffers(NamedTuple):
 def image_buffers(render_model: RenderModel, region: Region, appearance: Appearance) -> ViewBuffers:
     """Prepare a region: in linear light where the lights are unknown, in shares of full sRGB where they are known."""
     mean, sd, n_observations = appearance.background_pixels(region)
-    background = np.empty_like(mean)
-    if not inpaint(mean, n_observations, background):
-        background[:] = region.rgb
+    certainty = np.empty(sd.shape, np.float32)
+    background = mean
+    if not certainty_of(sd, n_observations, certainty):
+        background = np.empty_like(mean)
+        if not inpaint(mean, n_observations, background):
+            background[:] = region.rgb
     table = LIGHT_FROM_SRGB if render_model.lights is None else _TO_SHARE
     observed, background_light = np.empty((2, 3, *sd.shape), np.float32)
     light_planes(region.rgb, table, observed)
     light_planes(background, table, background_light)
-    certainty = np.minimum(1, (START_SD / sd) ** 2)
     if render_model.lights is None:
         light: Any = np.zeros((3, LIGHT_TERMS), np.float32)
         light[:, 0] = 1

@@ -39,6 +39,10 @@ class Reference:
             True,
         )
 
+    def is_met(self, shares: tuple[float, float] | None, least: float) -> bool:
+        """Whether precision and recall, if they are known, are at least a share of the reference's."""
+        return shares is not None and shares[0] >= least * self.precision and shares[1] >= least * self.recall
+
 
 @dataclass(frozen=True, slots=True)
 class MaskAgreement:
