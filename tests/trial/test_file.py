@@ -337,7 +337,7 @@ def test_empty_missing_or_binary_file_is_refused(folder):
     with pytest.raises(TrialError, match="cannot be read"):
         read_trial(folder)
     (folder / "binary.toml").write_bytes(bytes(range(256)))
-    with pytest.raises(TrialError, match=r"binary\.toml: not a TOML file: it is not a text file; expected a trial's"):
+    with pytest.raises(TrialError, match=r"binary\.toml: not a TOML file: it is not a text file; correct it"):
         read_trial(folder / "binary.toml")
 
 

@@ -12,7 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from airborne.appearance.model import Appearance
+from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import delta_between, move_pose
 from airborne.rendering import Lights
@@ -128,7 +128,10 @@ class RefinedTracker:
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
         motion = self._motion(before, frames)
-        is_steady = bool(state.past) and state.reference.is_met(estimate.mask_shares, _STEADY)
+        shares = estimate.mask_shares
+        if state.past and shares is None:  # an estimate of an earlier run, read back
+            shares = self._mask_shares(estimate.pose, regions, state.appearance)
+        is_steady = bool(state.past) and state.reference.is_met(shares, _STEADY)
         turn = state.n_learned // 2 % 2  # twice each: the two backgrounds of fields take turns, too
         appearance = learn_appearance(
             self.render_model,
@@ -139,12 +142,15 @@ class RefinedTracker:
             colours=turn == 1 or not is_steady,
             backgrounds=turn == 0 or not is_steady,
         )
-        reference = state.reference
-        if state.past and estimate.mask_shares is not None:
-            reference = reference.update(*estimate.mask_shares)
-        elif (learned := LearnedRegions.of(regions, appearance)).masks.regions:  # nothing was known of colours before
-            reference = reference.update(*self._fitter.agreement(estimate.pose, learned).shares)
+        if not state.past:  # nothing was known of colours before
+            shares = self._mask_shares(estimate.pose, regions, appearance)
+        reference = state.reference if shares is None else state.reference.update(*shares)
         return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1)
+
+    def _mask_shares(self, pose: Pose, regions: Sequence[Region], appearance: Appearance) -> tuple[float, float] | None:
+        """Return precision and recall of a pose's mask; None where no region's colours have been learned."""
+        learned = LearnedRegions.of(regions, appearance)
+        return self._fitter.agreement(pose, learned).shares if learned.masks.regions else None
 
     def turn(self, state: RefinedState) -> RefinedState:
         """Return the state from which the body is tracked back in time: the past is as it would be met then."""
