@@ -118,8 +118,7 @@ class RefinedTracker:
         """Return the state after the frames, given their estimate."""
         if estimate.pose is None:
             return state
-        frames = self.reduce_frames(frames)
-        before = state.past
+        frames, before = self.reduce_frames(frames), state.past
         if frames.index in self._keys and before:
             before = predictors.correct_past(before, frames.time_s, estimate.pose)
         past = (*before, (frames.time_s, estimate.pose))[-_HISTORY:]
@@ -147,9 +146,9 @@ class RefinedTracker:
         reference = state.reference if shares is None else state.reference.update(*shares)
         return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1)
 
-    def _mask_shares(self, pose: Pose, regions: Sequence[Region], appearance: Appearance) -> tuple[float, float] | None:
+    def _mask_shares(self, pose: Pose, regions: Sequence[Region], known: Appearance) -> tuple[float, float] | None:
         """Return precision and recall of a pose's mask; None where no region's colours have been learned."""
-        learned = LearnedRegions.of(regions, appearance)
+        learned = LearnedRegions.of(regions, known)
         return self._fitter.agreement(pose, learned).shares if learned.masks.regions else None
 
     def turn(self, state: RefinedState) -> RefinedState:
