@@ -153,6 +153,7 @@ def wait_for_still_scene(page) -> int:
         }
         return drawn();
     }"""
+    page.wait_for_selector("canvas:not(.view)", state="attached")
     return page.evaluate(script)
 
 

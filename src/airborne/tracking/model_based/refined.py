@@ -127,9 +127,7 @@ class RefinedTracker:
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
         motion = self._motion(before, frames)
-        shares = estimate.mask_shares
-        if state.past and shares is None:  # an estimate of an earlier run, read back
-            shares = self._mask_shares(estimate.pose, regions, state.appearance)
+        shares = estimate.mask_shares or self._mask_shares(estimate.pose, regions, state.appearance)  # rows have none
         is_steady = bool(state.past) and state.reference.is_met(shares, _STEADY)
         turn = state.n_learned // 2 % 2  # twice each: the two backgrounds of fields take turns, too
         appearance = learn_appearance(
@@ -143,7 +141,7 @@ class RefinedTracker:
         )
         if not state.past:  # nothing was known of colours before
             shares = self._mask_shares(estimate.pose, regions, appearance)
-        reference = state.reference if shares is None else state.reference.update(*shares)
+        reference = state.reference.update(*shares) if shares else state.reference
         return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1)
 
     def _mask_shares(self, pose: Pose, regions: Sequence[Region], known: Appearance) -> tuple[float, float] | None:
