@@ -14,7 +14,7 @@ from airborne.studio.calibrating import NETS, court_text, read_findings
 from airborne.studio.clicks import list_surveys
 from airborne.studio.pages.calibrate import CalibratePanel
 from airborne.studio.pages.control_points import ControlPointsPanel
-from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, show_findings, work
+from airborne.studio.pages.layout import errors_shown, in_thread, name_missing_steps, page_frame, show_findings, work
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras
 
@@ -30,8 +30,7 @@ async def cameras_page(session: Session) -> None:
     """Let the user choose a calibration file, or a survey and click its points."""
     async with page_frame(session, "Cameras", "Where are the cameras?", _HELP) as changed:
         project = session.project()
-        if not project.cameras:
-            ui.label("Choose the cameras first, in the step Videos.").classes("warn")
+        if name_missing_steps(session, "camera"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:

@@ -28,7 +28,7 @@ from airborne.studio.digitising import (
     record_text,
     set_frame,
 )
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -50,8 +50,7 @@ _AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing
 async def digitise_page(session: Session) -> None:
     """Let one person digitise points, and compare."""
     async with page_frame(session, "Digitise", "Where do you see it?", _HELP) as changed:
-        if not session.project().cameras:
-            ui.label("This step needs the step Videos first.").classes("warn")
+        if name_missing_steps(session, "camera"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:

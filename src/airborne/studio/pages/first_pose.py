@@ -12,19 +12,18 @@ from airborne.studio.pages.click_players import PlayersPanel
 from airborne.studio.pages.click_pose import ClickPanel
 from airborne.studio.pages.find_players import FindPlayersPanel
 from airborne.studio.pages.find_pose import FindPanel
-from airborne.studio.pages.layout import complain, in_thread, page_frame, work
+from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.session import Session
 
+_HELP = "Choose the frame where tracking shall start, and place the body there. Each later frame follows from it."
 _CLICK, _FIND = "Click the points", "Let it be found"
 
 
 async def first_pose_page(session: Session) -> None:
     """Let the user find or click the pose at one frame, and write it into the trial."""
     project = session.project()
-    async with page_frame(session, "First pose", "Where is the body at the start?", "") as changed:
-        missing = [name for name in ("camera", "calibration", "body") if not project.tables.get(name)]
-        if missing:
-            ui.label(f"This step needs the steps before it: {', '.join(missing)}.").classes("warn")
+    async with page_frame(session, "First pose", "Where is the body at the start?", _HELP) as changed:
+        if name_missing_steps(session, "camera", "calibration", "body"):
             return
         shown = await work("indexing the videos", session.shown)
         rig = await work("calibrating the cameras", session.rig)

@@ -18,6 +18,7 @@ _T = TypeVar("_T")
 _LOOK_EVERY_S = 1.0  # for changes by other windows and other programs
 _BLUE = "#0072b2"  # of buttons: dark enough for white letters
 _GREEN = "#007a5a"  # of good news, likewise
+_STEP_OF = {"camera": "Videos", "calibration": "Cameras", "body": "Body"}  # where each table is written
 _KEYS = {
     "← →": "one frame back or on; with Shift ten",
     ", .": "one frame back or on, also while a point is chosen",
@@ -151,6 +152,15 @@ def _example(here: str) -> ui.dialog:
         picture._props["alt"] = f"the step {here}, done for the thrown cross"
         ui.button("Close", on_click=dialog.close).props("flat")
     return dialog
+
+
+def name_missing_steps(session: Session, *tables: str) -> bool:
+    """Tell which steps come first, where the trial lacks tables that this one needs; return whether it does."""
+    missing = [_STEP_OF[table] for table in tables if not session.project().tables.get(table)]
+    if missing:
+        verb = "comes" if len(missing) == 1 else "come"
+        ui.label(f"First {verb} {', '.join(missing)}: see the steps at the left.").classes("warn")
+    return bool(missing)
 
 
 def show_findings(sentences: Iterable[str]) -> None:

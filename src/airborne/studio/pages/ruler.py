@@ -11,7 +11,7 @@ from nicegui import ui
 
 from airborne.cameras import Rig
 from airborne.studio.clicks import Clicked, measure_between, read_clicked
-from airborne.studio.pages.layout import errors_shown, page_frame, work
+from airborne.studio.pages.layout import errors_shown, name_missing_steps, page_frame, work
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, CLICK_SD_PX, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -29,6 +29,8 @@ _HELP = (
 async def ruler_page(session: Session) -> None:
     """Let the user measure a distance in the pictures."""
     async with page_frame(session, "Body", "How long is it?", _HELP) as changed:
+        if name_missing_steps(session, "camera", "calibration"):
+            return
         shown = await work("indexing the videos", session.shown)
         rig = await work("calibrating the cameras", session.rig)
         if shown is None or rig is None:

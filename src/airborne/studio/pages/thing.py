@@ -10,7 +10,7 @@ from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError
 from airborne.io.names import check_name
 from airborne.studio.pages.body import save_body
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import is_inside
 from airborne.studio.session import Session
@@ -28,6 +28,8 @@ _FIELDS = {"size_mm": "lengths [mm]", "centre_mm": "centre [mm]", "turn_deg": "t
 async def thing_page(session: Session) -> None:
     """Let the user describe a thing."""
     async with page_frame(session, "Body", "What is it made of?", _HELP):
+        if name_missing_steps(session, "camera"):
+            return
         shown = await work("indexing the videos", session.shown)
         if shown is not None:
             ThingPanel(session, shown).build()

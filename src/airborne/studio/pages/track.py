@@ -12,7 +12,7 @@ from airborne.errors import STOPPED, AirborneError, TrialError, count
 from airborne.io.names import check_name
 from airborne.motion.run_folder import MOTION, SUMMARY
 from airborne.studio.commands import Command
-from airborne.studio.pages.layout import complain, in_thread, page_frame, work
+from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import is_inside, list_runs
 from airborne.studio.runs import count_rows
@@ -29,10 +29,7 @@ _HELP = (
 async def track_page(session: Session) -> None:
     """Start, watch, stop and resume a run."""
     async with page_frame(session, "Track", "Follow the body", _HELP):
-        project = session.project()
-        missing = [name for name in ("camera", "calibration", "body") if not project.tables.get(name)]
-        if missing:
-            ui.label(f"This step needs the steps before it: {', '.join(missing)}.").classes("warn")
+        if name_missing_steps(session, "camera", "calibration", "body"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:
