@@ -49,7 +49,7 @@ def test_axe_finds_nothing_on_any_page(folder):
             page.goto("/".join([*address.split("/")[:3], name]))
             page.get_by_text(text).first.wait_for()
             page.wait_for_function("!document.querySelector('.q-notification')")  # those fade in and out
-            page.evaluate("Promise.all(document.getAnimations().map((each) => each.finished))")
+            page.evaluate("Promise.allSettled(document.getAnimations().map((each) => each.finished))")
             response = axe.run(page).response
             assert len(response["passes"]) > 20
             found[name] = [(each["id"], [node["html"] for node in each["nodes"]]) for each in response["violations"]]
