@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.body import surface_arrays
-from airborne.rendering import FLAT, evidence_maps, mask_evidence, render
+from airborne.body import surface_arrays, surface_of_segments
+from airborne.rendering import FLAT, evidence_maps, mask_evidence, render, uncovered_maps
 from airborne.rendering.reduction import reduce_camera, reduce_image
 from tests.support.bodies import batch, camera, in_slabs, random_body
 
@@ -44,3 +44,20 @@ def test_an_ellipsoid_in_two_colours_has_as_much_evidence_as_in_one():
 def test_totals_are_the_sums_of_the_whole_maps():
     totals = evidence_maps(CAMERAS, MAPS).totals
     np.testing.assert_allclose(totals, [plane.sum(dtype=float) for plane in MAPS], atol=SUM)
+
+
+@pytest.mark.parametrize(
+    "kinds", [["ellipsoid"] * 6, ["box"] * 4, ["ellipsoid", "box", "mesh", "slab"]], ids=lambda k: k[0]
+)
+def test_segments_that_cover_first_leave_the_others_what_the_whole_body_covers_beyond_them(kinds):
+    model = random_body(kinds, np.random.default_rng(3))
+    surface, (R, t), maps = surface_arrays(model), batch(model, 6, 4), evidence_maps(CAMERAS, MAPS)
+    is_first = np.arange(len(model.segments)) % 2 == 0
+    first, others = surface_of_segments(surface, is_first), surface_of_segments(surface, ~is_first)
+    left = uncovered_maps(first, maps, R[0], t[0])
+    np.testing.assert_allclose(left.totals, maps.totals - mask_evidence(first, maps, R[:1], t[:1])[0], atol=SUM)
+    R[:, is_first], t[:, is_first] = R[0, is_first], t[0, is_first]
+    beyond = mask_evidence(others, left, R, t)
+    assert np.abs(beyond).max() > 10
+    whole = mask_evidence(surface, maps, R, t)
+    np.testing.assert_allclose(mask_evidence(first, maps, R, t) + beyond, whole, atol=SUM)

@@ -18,7 +18,7 @@ from airborne.body.model import (
 )
 from airborne.body.outfits import ATHLETE, SAMPLED, Outfit
 from airborne.body.shaping import with_girths, with_segment_lengths
-from airborne.body.surface import SurfaceArrays, has_flat_sides, surface_arrays
+from airborne.body.surface import SurfaceArrays, has_flat_sides, surface_arrays, surface_of_segments
 
 __all__ = [
     "ATHLETE",
@@ -45,6 +45,7 @@ __all__ = [
     "human18_from_measurements",
     "read_measurements",
     "surface_arrays",
+    "surface_of_segments",
     "with_girths",
     "with_segment_lengths",
     "write_measurements",

@@ -89,6 +89,18 @@ def surface_arrays(model: BodyModel) -> SurfaceArrays:
     )
 
 
+def surface_of_segments(surface: SurfaceArrays, is_kept: NDArray[np.bool_]) -> SurfaceArrays:
+    """Return what some segments show of a body's surface, is_kept (s,), numbered as before."""
+    e, p = is_kept[surface.ellipsoid_segment], is_kept[surface.polygon_segment]
+    sizes = np.diff(surface.start)
+    c = np.repeat(p, sizes)
+    ellipsoids = {name: getattr(surface, name)[e] for name in SurfaceArrays._fields if name.startswith("ellipsoid")}
+    polygons = {name: getattr(surface, name)[p] for name in ("polygon_segment", "polygon_part", "normals", "is_smooth")}
+    corners = {name: getattr(surface, name)[c] for name in ("corners", "corner_normals")}
+    start = np.concatenate([[0], np.cumsum(sizes[p])]).astype(np.int64)
+    return surface._replace(**ellipsoids, **polygons, **corners, start=start)
+
+
 def has_flat_sides(shape: Shape) -> bool:
     """Say whether a shape's edges are visible: boxes, and meshes without a gently curved part."""
     if not isinstance(shape, Mesh):

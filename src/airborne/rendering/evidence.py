@@ -7,7 +7,7 @@ cumulative sums along the image's columns are stored, so that a span of the mask
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,18 @@ def mask_evidence(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Arra
     return out
 
 
+def uncovered_maps(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Array) -> EvidenceMaps:
+    """Return the maps without what a posed body covers: zero there. R (s, 3, 3), t (s, 3) [m], world from segment.
+
+    Of masks that share some segments, only the others have to be drawn on what these leave.
+    """
+    sums = np.zeros_like(maps.sums)
+    poses = np.ascontiguousarray(R, float), np.ascontiguousarray(t, float)
+    _sum_uncovered(new_shapes(geometry), geometry, *poses, maps.views, maps.sizes, maps.sums, sums)
+    ends = [sums[at : at + rows * (pixels + 1)].reshape(rows, -1)[:, -1] for pixels, rows, at in maps.sizes]
+    return replace(maps, sums=sums, totals=np.array([each.sum(dtype=float) for each in ends]))
+
+
 @kernel(fastmath=True)
 def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
     """Fill `out` (n, views); see `mask_evidence`. In each row the spans are sorted from the left and merged."""
@@ -81,12 +93,7 @@ def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
             total = 0.0
             for v in range(height):
                 start, stop = row_start[v], row_stop[v]
-                for k in range(start + 1, stop):
-                    first, last, at = ends[k, 0], ends[k, 1], k
-                    while at > start and ends[at - 1, 0] > first:
-                        ends[at, 0], ends[at, 1] = ends[at - 1, 0], ends[at - 1, 1]
-                        at -= 1
-                    ends[at, 0], ends[at, 1] = first, last
+                _sort_spans(ends, start, stop)
                 base, covered = offset + v * (width + 1), -1
                 for k in range(start, stop):
                     first, last = max(ends[k, 0], covered + 1), ends[k, 1]
@@ -94,3 +101,39 @@ def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
                         total += sums[base + last + 1] - sums[base + first]
                         covered = last
             out[h, i] = total
+
+
+@kernel(fastmath=True)
+def _sum_uncovered(shapes, geometry, R, t, views, sizes, sums, out):
+    """Fill `out`, as `sums`, without the pixels that a body covers; see `uncovered_maps`."""
+    pose_shapes(shapes, geometry, R, t)
+    for i in range(len(views)):
+        width, height, offset = sizes[i, 0], sizes[i, 1], sizes[i, 2]
+        spans = list_spans(shapes, geometry, views[i], width, height)
+        row_start, row_stop, ends = spans.row_start, spans.row_stop, spans.ends
+        for v in range(height):
+            start, stop = row_start[v], row_stop[v]
+            _sort_spans(ends, start, stop)
+            base, at, hidden = offset + v * (width + 1), 0, 0.0
+            for k in range(start, stop):
+                first, last = max(ends[k, 0], at), ends[k, 1]
+                if last >= first:
+                    for u in range(at, first):
+                        out[base + u + 1] = sums[base + u + 1] - hidden
+                    hidden += sums[base + last + 1] - sums[base + first]
+                    for u in range(first, last + 1):
+                        out[base + u + 1] = out[base + first]
+                    at = last + 1
+            for u in range(at, width):
+                out[base + u + 1] = sums[base + u + 1] - hidden
+
+
+@kernel(fastmath=True, is_inner=True)
+def _sort_spans(ends, start, stop):
+    """Sort the spans `start` to `stop - 1` of a row from the left, by insertion: there are few."""
+    for k in range(start + 1, stop):
+        first, last, at = ends[k, 0], ends[k, 1], k
+        while at > start and ends[at - 1, 0] > first:
+            ends[at, 0], ends[at, 1] = ends[at - 1, 0], ends[at - 1, 1]
+            at -= 1
+        ends[at, 0], ends[at, 1] = first, last

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays
+from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays, surface_of_segments
 from airborne.cameras import Camera
 from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence
 from airborne.tracking.first_pose.moments import Moment
@@ -62,7 +62,7 @@ class Limb:
 
     segments: NDArray[np.int64]
     alone: SurfaceArrays
-    rest: BodyModel
+    rest: SurfaceArrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +85,10 @@ class JointedBody:
     @cached_property
     def limbs(self) -> list[Limb]:
         """Arms and legs."""
-        found = []
+        surface, found = self.render_model.geometry, []
         for segments in limbs_of(self.model):
-            alone, rest = (
-                replace(
-                    self.model,
-                    segments=tuple(
-                        each if (i in segments) == keeps else replace(each, parts=())
-                        for i, each in enumerate(self.model.segments)
-                    ),
-                )
-                for keeps in (True, False)
-            )
-            found.append(Limb(segments, RenderModel.of(alone).geometry, rest))
+            is_own = np.isin(np.arange(len(self.model.segments)), segments)
+            found.append(Limb(segments, surface_of_segments(surface, is_own), surface_of_segments(surface, ~is_own)))
         return found
 
     @cached_property
@@ -191,16 +182,6 @@ class SilhouetteEvidence:
         segments = person.segments(poses)
         scores = mask_evidence(person.render_model.geometry, self.maps, *segments, threads=THREADS)
         return scores.sum(axis=1) / max(self.total, 1e-9)
-
-    def without(self, render_model: RenderModel, posed: PosedBody) -> EvidenceMaps:
-        """Return what a body does not cover."""
-        left = []
-        for camera, plane in zip(self.cameras, self.planes, strict=True):
-            sums = np.zeros((plane.shape[1], plane.shape[0] + 1), np.float32)
-            covered = render_model.draw(posed, camera).part >= 0
-            np.cumsum(np.where(covered, 0, plane).T, axis=1, dtype=np.float32, out=sums[:, 1:])
-            left.append(sums.ravel())
-        return replace(self.maps, sums=np.concatenate(left))
 
 
 def apart(points: Array, scores: Array, n: int, least_m: float) -> NDArray[np.int64]:

@@ -14,13 +14,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.special import ndtri
 
 from airborne.appearance.model import Region
-from airborne.body import BodyModel, Pose, PosedBody
+from airborne.body import BodyModel, Pose
 from airborne.body.chain import clamp_to_limits, joint_angles_of, move_pose
 from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles, super_fibonacci
 from airborne.geometry.sampling import sobol_points
-from airborne.rendering import mask_evidence
+from airborne.rendering import mask_evidence, uncovered_maps
 from airborne.rendering.threads import in_threads
 from airborne.tracking.first_pose.colour_information import PixelColours, colour_classes
 from airborne.tracking.first_pose.moments import Moment
@@ -31,7 +31,6 @@ from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints
 from airborne.tracking.model_based.gauss_newton import Posteriors, PyramidLevels, fit_silhouettes
 from airborne.tracking.model_based.left_right_swap import swap_limbs
-from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
 _N_ORIENTATIONS = 300  # about 20 degrees from any orientation to the nearest
@@ -179,10 +178,9 @@ def _limb_coverage(person: JointedBody, limb: Limb, moved: PoseSet, silhouettes:
     out = np.zeros((len(R) // k, k))
 
     def fill(part: slice) -> None:
-        rest = RenderModel.of(limb.rest)
         for i in range(part.start, part.stop):
             rows = slice(i * k, (i + 1) * k)
-            maps = silhouettes.without(rest, PosedBody(limb.rest, R[i * k], t[i * k]))
+            maps = uncovered_maps(limb.rest, silhouettes.maps, R[i * k], t[i * k])
             out[i] = mask_evidence(limb.alone, maps, R[rows], t[rows]).sum(axis=1)
 
     in_threads(fill, len(out), THREADS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,13 @@ from scipy.spatial.transform import RigidTransform
 from scipy.special import ndtri
 
 from airborne.appearance.model import Region
-from airborne.body import BodyModel, Pose
+from airborne.body import BodyModel, Pose, SurfaceArrays, surface_of_segments
 from airborne.body.chain import angles_near
 from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.geometry.sampling import sobol_points
-from airborne.rendering import EvidenceMaps, mask_evidence
+from airborne.rendering import EvidenceMaps, mask_evidence, uncovered_maps
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -63,7 +63,11 @@ def search_limb(
     limits = JointLimits.stack(render_model.model.segments[segment].limits for segment in limb)
     reach = np.minimum(limits.half_rad.ravel() / 2, _REACH_RAD)  # a hinge is searched about its one axis
     anywhere = np.concatenate([angles, _all_over(limits, joints, angles[0])])
-    angles = _best(render_model, root, anywhere, limb=limb, maps=maps, n=_N_FIRST)
+    is_own = np.isin(np.arange(len(render_model.model.segments)), limb)
+    posed = render_model.with_pose(poses[0])
+    left = uncovered_maps(surface_of_segments(render_model.geometry, ~is_own), maps, posed.R, posed.t)
+    search = _LimbSearch(render_model.model, limb, surface_of_segments(render_model.geometry, is_own), root, left)
+    angles = search.best(anywhere, _N_FIRST)
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
         steps = ndtri(sobol_points(3 * len(limb), n_proposals, seed=number)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
@@ -71,7 +75,7 @@ def search_limb(
         turned = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)
         proposed[:, joints] = angles_near(limits.clamp(matrix_from_angles(turned)), turned)
         proposed = np.concatenate([angles, proposed])
-        angles = _best(render_model, root, proposed, limb=limb, maps=maps, n=n_survivors)
+        angles = search.best(proposed, n_survivors)
     return [replace(poses[0], joint_angles=each) for each in angles]
 
 
@@ -101,26 +105,28 @@ def with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:
     return angles
 
 
-def _best(
-    render_model: RenderModel,
-    root: RigidTransform,
-    angles: Array,
-    *,
-    limb: NDArray[np.int64],
-    maps: EvidenceMaps,
-    n: int,
-) -> Array:
-    """Return the n joint angles (n, joints, 3) of most evidence, best first, that have the limb in different places."""
-    R = np.broadcast_to(root.rotation.as_matrix(), (len(angles), 3, 3))
-    t = np.broadcast_to(root.translation, (len(angles), 3))
-    R, t = render_model.model.pose_segments(R, t, angles)
-    scores = mask_evidence(render_model.geometry, maps, R, t).sum(axis=1)
-    left, best = np.argsort(-scores, kind="stable"), []
-    while len(left) and len(best) < n:
-        best.append(left[0])
-        away_m = np.linalg.norm(t[left][:, limb] - t[left[0], limb], axis=-1).max(axis=1)
-        left = left[away_m > DISTINCT_M]
-    return angles[best]
+@dataclass(frozen=True, slots=True, eq=False)
+class _LimbSearch:
+    """A limb, drawn alone on what the rest of the body leaves of the evidence."""
+
+    model: BodyModel
+    limb: NDArray[np.int64]
+    surface: SurfaceArrays
+    root: RigidTransform
+    maps: EvidenceMaps
+
+    def best(self, angles: Array, n: int) -> Array:
+        """Return the n joint angles (n, joints, 3) of most evidence, best first, that have the limb in other places."""
+        R = np.broadcast_to(self.root.rotation.as_matrix(), (len(angles), 3, 3))
+        t = np.broadcast_to(self.root.translation, (len(angles), 3))
+        R, t = self.model.pose_segments(R, t, angles)
+        scores = mask_evidence(self.surface, self.maps, R, t).sum(axis=1)
+        left, best = np.argsort(-scores, kind="stable"), []
+        while len(left) and len(best) < n:
+            best.append(left[0])
+            away_m = np.linalg.norm(t[left][:, self.limb] - t[left[0], self.limb], axis=-1).max(axis=1)
+            left = left[away_m > DISTINCT_M]
+        return angles[best]
 
 
 def _all_over(limits: JointLimits, joints: NDArray[np.int64], angles: Array) -> Array:
