@@ -38,7 +38,7 @@ class Session:
 
     @property
     def frame(self) -> int:
-        """The frame in view."""
+        """The frame that was in view last, in any window: a page opens there; what is done to one is its view's."""
         return self.place.frame
 
     def go(self, *, page: str | None = None, frame: int | None = None) -> None:

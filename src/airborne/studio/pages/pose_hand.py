@@ -43,6 +43,11 @@ class PoseHand:
         """Begin with a pose."""
         self.pose, self._pins, self._number, self.before = pose, {}, -1, []
 
+    async def place_next(self, pose: Pose | None) -> None:
+        """Begin with a pose once the movement on its way has been made: that is of the pose before."""
+        async with self._one_at_a_time:
+            self.place(pose)
+
     def items(self) -> list[dict[str, Any]]:
         """Return the pose's outline, where it can be grabbed."""
         if self.pose is None:

@@ -52,10 +52,10 @@ class ThingPanel:
         """Lay out the pictures and the solids."""
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
-                view = CameraViews(
+                self.view = CameraViews(
                     self.shown, frame=self.session.frame, on_frame=self.turn_to, on_pick=self.take_colour
                 )
-                view.start_picking()
+                self.view.start_picking()
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
                 ui.input("what it is").bind_value(self, "name").props("outlined dense")
                 self.form = ui.refreshable(self._form)
@@ -68,7 +68,7 @@ class ThingPanel:
 
     async def take_colour(self, pane: int, u: float, v: float, near: str | None) -> None:
         """Give the chosen solid the colour that a picture has there."""
-        number = int(self.shown.clock.images[self.session.frame, pane])
+        number = int(self.shown.clock.images[self.view.frame, pane])
         with errors_shown():
             image = await in_thread(self.session.pictures.image, self.shown.sources[pane], number)
             if image is not None:

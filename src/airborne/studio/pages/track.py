@@ -162,7 +162,7 @@ class _Panel:
             self.curves.show(self._curves)
         elif self.n_done > 0:
             with self.area:
-                self.curves = Curves(self._curves, frame=self.session.frame).style("height: 220px")
+                self.curves = Curves(self._curves, frame=self.view.frame).style("height: 220px")
 
     def _say_progress(self, command: Command, n_done: int) -> None:
         left = ""
