@@ -177,7 +177,8 @@ class _Panel:
 
     def start(self, way: str) -> None:
         """Start `airborne sync`."""
-        self.watch.start("sync", self.session.path.name, "--by", way)
+        trial = self.session.path.name
+        self.watch.start("sync", trial, "--by", way, writes=trial, what="offsets found")
 
     def tell(self, command: Command) -> None:
         """Show what it has found."""
