@@ -143,6 +143,10 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         """Show a frame, in every part of the page."""
         self.run_method("show", frame)
 
+    def lead(self, frame: int, *, anew: bool) -> None:
+        """Show a frame as the next of a row that `anew` begins; not while the user looks at another."""
+        self.run_method("lead", frame, anew)
+
 
 async def _finish(result: Any) -> None:
     if isawaitable(result):

@@ -71,13 +71,13 @@ class DigitisePanel(PointsPanel):
 
     def __init__(self, session: Session, shown: ShownTrial, model: BodyModel | None) -> None:
         """Begin with the clicks that lie in the folder, or with none."""
+        super().__init__(session, shown, Clicked((), None, {}), "")
         known = list_repetitions(session.folder)
         self.who = known[-1] if known else Repetition("A", 1)
         self.model, self.frame = model, session.frame
         self.extra = self._kept()  # points that were named here
         self.rig: Rig | None = None  # for the epipolar help
         self.then = "point"
-        super().__init__(session, shown, Clicked((), None, {}), "")
         self.table = self._read()
         self.chosen = self.names[0] if self.names else ""
         self.clicked = self._of_frame()

@@ -135,7 +135,7 @@ class _Panel:
         self._show_buttons()
 
     async def look(self, *, anew: bool = False) -> None:
-        """Show how far the run is, and its newest frame."""
+        """Show how far the run is, and its newest frame unless the user looks at another."""
         if anew:
             self.view.set_overlay(self._overlay)
             self._show_buttons()
@@ -147,12 +147,12 @@ class _Panel:
             self.ended = command
             self._say_end(command)
         if n_done != self.n_done:
-            self.n_done = n_done
+            is_first, self.n_done = self.n_done < 0, n_done
             self.bar.value = n_done / max(self.n_frames, 1)
             self.view.run_method("refresh")
             self._show_curves()
             if newest is not None and self._is_running:
-                self.view.go(newest)
+                self.view.lead(newest, anew=is_first)
             self._show_buttons()
 
     def _show_curves(self) -> None:
