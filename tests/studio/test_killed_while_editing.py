@@ -107,7 +107,7 @@ def test_a_pose_that_is_dragged_is_there(folder):
         before = window.evaluate(OUTLINE, PANE)[0]
         old = work_until_killed(folder, window, drag_on)
     with open_window(folder, "/start") as window:
-        window.get_by_text("The pose was set by hand. Not yet used").wait_for()
+        window.get_by_text("The outline is the pose that was made here last. Not yet used").wait_for()
         window.wait_for_function(OUTLINE, arg=PANE)
         assert window.evaluate(OUTLINE, PANE)[0] > before + STEP_PX * (old - 0.5)
 

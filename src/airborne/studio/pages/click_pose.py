@@ -16,7 +16,7 @@ from airborne.studio.pages.fit_pose import FitButton
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, PointsPanel
-from airborne.studio.pages.pose_hand import DRAG_HELP, SET_BY_HAND, STORED, PoseHand
+from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
@@ -102,7 +102,7 @@ class ClickPanel(PointsPanel):
         if pose is None:
             await self.solve()
         else:
-            self.place(pose, SET_BY_HAND)
+            self.place(pose, KEPT)
 
     def begin_by_hand(self) -> None:
         """Show the body upright where the cameras look, to be dragged."""

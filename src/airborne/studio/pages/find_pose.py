@@ -12,7 +12,7 @@ from airborne.cameras import Rig
 from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.fit_pose import FitButton
 from airborne.studio.pages.layout import errors_shown
-from airborne.studio.pages.pose_hand import DRAG_HELP, SET_BY_HAND, STORED, PoseHand
+from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
@@ -68,7 +68,7 @@ class FindPanel:
         self.use.set_visibility(pose is not None)
         if self.found is not None and pose is not None:
             await self.draw(self.found["frame"], pose)
-            self.controls.says = self.controls.says or SET_BY_HAND
+            self.controls.says = self.controls.says or KEPT
             self.controls.tell(self.found)
         elif stored is not None:
             await self.draw(*stored)

@@ -18,6 +18,7 @@ from airborne.studio.view import CameraViews, Drag, Mark
 
 DRAG_HELP = "Drag a limb, or the whole by its trunk; with Shift it turns. A drag in a second picture sets the distance."
 SET_BY_HAND = "The pose was set by hand."
+KEPT = "The outline is the pose that was made here last."
 STORED = "The outline is the pose that the trial has."
 _FINE_PX = 1000  # wide: while larger pictures are dragged over, the outline has half their resolution
 
