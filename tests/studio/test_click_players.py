@@ -61,14 +61,16 @@ def test_players_are_clicked_and_a_length_is_measured(rig, folder):
         for name, point in LEGS.items():
             click_everywhere(user, rig, name, point)
         page.get_by_text("Ready to be used: player1.").wait_for()
-        page.get_by_label("another player's name").fill("passer")
+        page.get_by_label("another player's name").fill("player3")
         user.press("Add")
         page.locator(".point.here", has_text="torso").wait_for()  # the new player's list
         click_everywhere(user, rig, "torso", LEGS["torso"] + ASIDE)
-        page.get_by_text("Ready to be used: passer, player1.").wait_for()
+        page.get_by_text("Ready to be used: player1, player3.").wait_for()
+        user.press("Add")  # of those without a name, the first that is none of these
+        page.get_by_label("player", exact=True).and_(page.locator("[value=player2]")).wait_for()
         user.press("Use these players")
         page.get_by_text("the first poses are written into the trial").wait_for()
-        page.get_by_text("The trial's start, frame 0: passer, player1.").wait_for()  # also where nobody was clicked
+        page.get_by_text("The trial's start, frame 0: player1, player3.").wait_for()  # also where nobody was clicked
         page.goto(address.split("?")[0] + "ruler")
         wait_for_frame(page, 0)
         click_everywhere(user, rig, "from", LEGS["ankle_left"])
@@ -79,7 +81,7 @@ def test_players_are_clicked_and_a_length_is_measured(rig, folder):
     assert read_toml(folder / "trial.toml")["track"]["method"] == "blocker"
     trial = read_trial(folder / "trial.toml")
     starts = {start.name: start for start in player_starts(trial, rig)}
-    assert {name: start.has_legs for name, start in starts.items()} == {"passer": False, "player1": True}
+    assert {name: start.has_legs for name, start in starts.items()} == {"player1": True, "player3": False}
     for name, point in LEGS.items():
         assert np.linalg.norm(starts["player1"].joints_m[name] - point) < OFF_M
-    assert np.linalg.norm(starts["passer"].joints_m["torso"] - (LEGS["torso"] + ASIDE)) < OFF_M
+    assert np.linalg.norm(starts["player3"].joints_m["torso"] - (LEGS["torso"] + ASIDE)) < OFF_M

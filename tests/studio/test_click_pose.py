@@ -1,5 +1,7 @@
 """A person's first pose by clicks in a real browser: landmarks, a pixel off, become the pose that the command finds."""
 
+import shutil
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -135,6 +137,53 @@ def use_pose(page, folder, before):
             return start
         last = start
     raise AssertionError("the pose does not change")
+
+
+def middle(page):
+    """Return where the middle of the outline is in the first picture, rounded [px]; None without one."""
+    script = """() => {
+        const { view } = document.querySelector("canvas.view");
+        const points = view.nowItems().filter((item) => item.grab && item.pane === 0).flatMap((item) => item.points);
+        const mean = (axis) => Math.round(points.reduce((sum, point) => sum + point[axis], 0) / points.length);
+        return points.length ? [mean(0), mean(1)] : null;
+    }"""
+    return page.evaluate(script)
+
+
+def test_a_pose_set_by_hand_waits_in_its_frame_for_whoever_turns_away_reloads_or_undoes(folder, tmp_path):
+    folder = shutil.copytree(folder, tmp_path / "person")
+    (folder / "trial.toml").write_text(TRIAL)
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+        wait_for_frame(page, 0)
+        page.get_by_text("No landmark is clicked in frame 0 yet.").wait_for()
+        page.get_by_role("button", name="Place it by hand").click()
+        page.get_by_text("Drag the body, its limbs, and with Shift its turn.", exact=True).wait_for()
+        page.wait_for_function("document.querySelector('canvas.view').view.nowItems().length >= 2")
+        placed = middle(page)
+        drag_trunk(page, 0, (40.0, -18.0))
+        page.get_by_text("The pose was set by hand.").wait_for()
+        dragged = middle(page)
+        assert dragged[0] > placed[0] + 30
+        page.locator("canvas.view").press(".")
+        page.get_by_text("No landmark is clicked in frame 1 yet.").wait_for()
+        assert middle(page) is None
+        page.locator("canvas.view").press(",")
+        page.get_by_text("made here last").wait_for()
+        page.wait_for_function("document.querySelector('canvas.view').view.nowItems().length >= 2")
+        np.testing.assert_allclose(middle(page), dragged, atol=1)
+        page.reload()
+        page.get_by_text("made here last").wait_for()
+        page.wait_for_function("document.querySelector('canvas.view').view.nowItems().length >= 2")
+        np.testing.assert_allclose(middle(page), dragged, atol=1)
+        page.locator("canvas.view").press("Control+z")
+        page.get_by_text("undone: pose set by hand (draft.json)").wait_for()
+        for _ in range(100):
+            if abs(middle(page)[0] - placed[0]) <= 1:
+                break
+            page.wait_for_timeout(100)
+        np.testing.assert_allclose(middle(page), placed, atol=1)
+        page.locator("canvas.view").press("Control+z")
+        page.get_by_text("No landmark is clicked in frame 0 yet.").wait_for()
 
 
 def test_a_body_placed_by_hand_goes_where_drags_put_it(rig, folder):

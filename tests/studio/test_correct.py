@@ -1,5 +1,6 @@
 """A joint dragged in a view, in a real browser: a key at that frame, from which the run is tracked again."""
 
+import re
 import shutil
 
 import numpy as np
@@ -64,6 +65,50 @@ def turn_by_hand(page, middle_px):
     page.keyboard.up("Shift")
 
 
+def test_a_correction_is_of_its_own_windows_frame_whatever_another_window_shows(folder, tmp_path):
+    folder = shutil.copytree(folder, tmp_path / "cross")
+    rows, rig = read_motion(folder / "results" / "motion.csv"), read_rig(folder / "results" / "calib.toml")
+    model, camera = read_trial(folder / "trial.toml").model(), rig.names[CAMERA]
+    name = model.landmarks[0].name
+    here, there = (rig[camera].px_from_world(model.with_pose(rows.pose(n)).landmarks[0]) for n in (FRAME, FRAME - 2))
+    with fork_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/review?")) as page:
+        open_correction(page, FRAME)
+        wait_for_mark(page, f"{name}|{camera}", here[0])
+        other = page.context.new_page()
+        other.goto(page.url)
+        open_correction(other, FRAME - 2)
+        wait_for_mark(other, f"{name}|{camera}", there[0])
+        drag_joint(page, here)
+        page.get_by_text(f"{name} corrected in {camera}, frame {FRAME}").first.wait_for()
+        other.get_by_text("the corrections have changed").wait_for()
+        wait_for_mark(other, f"{name}|{camera}", there[0])
+        other.get_by_role("button", name="Leave it out").click()
+        other.get_by_text(f"left out of frames {FRAME - 2} to {FRAME - 2}").first.wait_for()
+        page.get_by_text(re.compile(f"{rig.names[0]}: {FRAME - 2} to {FRAME - 2}")).wait_for()
+        wait_for_mark(page, f"{name}|{camera}", here[0] + DRAGGED_PX[0])  # not the other's, drawn over this picture
+    (key,) = read_toml(folder / "trial.toml")["key"]
+    assert key["frame"] == FRAME
+
+
+def open_correction(page, frame):
+    """Go to a frame in Review, its joints to be grabbed."""
+    page.wait_for_function("document.querySelector('canvas.view')?.dataset.frame !== undefined")
+    go_home(page)
+    page.get_by_role("switch", name="Correct").click()
+    for number in range(1, frame + 1):
+        page.locator("canvas.view").press(".")
+        wait_for_frame(page, number)
+
+
+def drag_joint(page, px):
+    """Drag what is at a pixel of the camera."""
+    page.bring_to_front()
+    page.mouse.move(*at_pixel(page, CAMERA, *px))
+    page.mouse.down()
+    page.mouse.move(*at_pixel(page, CAMERA, *(px + DRAGGED_PX)), steps=5)
+    page.mouse.up()
+
+
 def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked_again(folder):
     run = folder / "results"
     before, rig = read_motion(run / "motion.csv"), read_rig(run / "calib.toml")
@@ -80,16 +125,10 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         page.wait_for_function("document.querySelector('canvas.view').view.shown.shrinks[0] === 1")
         assert times_smaller(page)[0] == 1
         page.locator("canvas.view").press("0")
-        page.get_by_role("switch", name="Correct").click()
-        for frame in range(1, FRAME + 1):
-            page.locator("canvas.view").press(".")
-            wait_for_frame(page, frame)
+        open_correction(page, FRAME)
         assert wait_for_still_scene(page) > still  # drawn when the body moved, and not all the time
         wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", u)
-        page.mouse.move(*at_pixel(page, CAMERA, u, v))
-        page.mouse.down()
-        page.mouse.move(*at_pixel(page, CAMERA, u + DRAGGED_PX[0], v + DRAGGED_PX[1]), steps=5)
-        page.mouse.up()
+        drag_joint(page, np.array([u, v]))
         page.get_by_text(f"{name} corrected in {rig.names[CAMERA]}, frame {FRAME}").first.wait_for()
         again = page.get_by_role("button", name="Track again around it")
         page.get_by_label("frame in view").press("Control+z")  # heard there too

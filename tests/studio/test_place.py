@@ -38,8 +38,8 @@ def test_no_edit_is_lost_when_the_studio_is_killed(tmp_path):
     rng = random.Random(5)
     for _ in range(N_KILLS):
         last = kill_while_editing(folder, 0.3, rng)
-        click, start, frame = edits_found(folder)
-        assert last <= frame <= start <= click <= last + 1
+        click, start, draft, frame = edits_found(folder)
+        assert last <= frame <= draft <= start <= click <= last + 1
 
 
 def test_the_address_that_is_printed_is_the_page_that_was_open(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from airborne.body.files import read_body
 from airborne.errors import BodyError
 from airborne.io.text import read_toml
-from airborne.studio.things import Solid, colour_at, read_thing, thing_text
+from airborne.studio.things import Solid, colour_at, parse_thing, thing_text
 from tests.support.places import THROWN_CROSS
 from tests.support.studio import User, at_pixel, fork_studio, open_page, wait_for_frame
 
@@ -21,7 +21,7 @@ BALL = Solid("ball", "ellipsoid", (200.0, 200.0, 210.0))
 def test_a_thing_is_read_back_and_is_a_body(tmp_path):
     path = tmp_path / "thing.toml"
     path.write_text(thing_text("a club", [BOX, BALL]))
-    assert read_thing(path) == ("a club", [BOX, BALL])
+    assert parse_thing(path.read_text(), path.name) == ("a club", [BOX, BALL])
     (segment,) = read_body(path).segments
     bar, ball = segment.parts
     assert bar.shape.size_m.tolist() == [0.06, 0.9, 0.045]
@@ -29,11 +29,10 @@ def test_a_thing_is_read_back_and_is_a_body(tmp_path):
     assert ball.shape.semi_axes_m.tolist() == [0.1, 0.1, 0.105]
 
 
-def test_a_body_of_several_pieces_is_left_alone(tmp_path):
-    path = tmp_path / "thing.toml"
-    path.write_text(thing_text("a", [BOX]) + '[[segment]]\nname = "b"\nparent = "thing"\n')
+def test_a_body_of_several_pieces_is_left_alone():
+    text = thing_text("a", [BOX]) + '[[segment]]\nname = "b"\nparent = "thing"\n'
     with pytest.raises(BodyError, match=r"thing\.toml is more than solids in one piece"):
-        read_thing(path)
+        parse_thing(text, "thing.toml")
 
 
 def test_a_colour_is_the_median_about_a_click_even_at_the_border():
@@ -51,7 +50,7 @@ def test_a_solid_takes_the_colour_that_is_clicked_in_a_picture(tmp_path):
         page.get_by_text(re.compile(r"colour \d")).wait_for()
         User(page).press("Use this thing")
         page.get_by_text("the body is written into the trial").wait_for()
-    (solid,) = read_thing(folder / "thing.toml")[1]
+    (solid,) = parse_thing((folder / "thing.toml").read_text(), "thing.toml")[1]
     assert (solid.size_mm, read_toml(folder / "trial.toml")["body"]["file"]) == ((100.0, 900.0, 100.0), "thing.toml")
     red, green, blue = solid.colour
     assert red > green > 2 * blue

@@ -1,9 +1,11 @@
 """In a real browser: the frame that is asked for is the one that is shown, and clicks land to a tenth of a pixel."""
 
+import shutil
 from fractions import Fraction
 
 import pytest
 
+from airborne.io.text import read_toml
 from airborne.studio.clicks import read_clicked
 from airborne.video import VideoSource, VideoWriter, weave
 from airborne.video.seeking import index_images
@@ -157,3 +159,30 @@ def test_two_windows_see_the_same(address, folder):
         page.mouse.click(*at_pixel(page, 1, 100.0, 120.0))
         marks = "() => document.querySelector('canvas.view').view.marks"
         other.wait_for_function(f"{marks[6:]}.some(mark => mark.id?.endsWith('|fields'))")
+
+
+def test_a_run_leads_the_view_only_while_nobody_looks_at_another_frame(address):
+    with open_page(address) as page:
+        go_home(page)
+        canvas = page.locator("canvas.view")
+        canvas.evaluate("canvas => canvas.view.lead(3, true)")
+        wait_for_frame(page, 3)
+        canvas.evaluate("canvas => canvas.view.lead(4, false)")
+        wait_for_frame(page, 4)
+        canvas.press(",")
+        wait_for_frame(page, 3)
+        canvas.evaluate("canvas => canvas.view.lead(5, false)")
+        assert canvas.evaluate("canvas => canvas.view.wanted") == 3
+        canvas.evaluate("canvas => canvas.view.go(5)")
+        canvas.evaluate("canvas => canvas.view.lead(6, false)")
+        wait_for_frame(page, 6)  # who is at the newest frame goes on with it
+
+
+def test_fields_that_are_read_by_the_files_flags_stay_so_when_the_cameras_are_written(folder, tmp_path):
+    folder = shutil.copytree(folder, tmp_path / "numbers")
+    (folder / "trial.toml").write_text(TRIAL.replace('"top-first"', '"auto"'))
+    with fork_studio(folder) as address, open_page(address) as page:
+        page.get_by_text("as the file's flags say").wait_for()
+        page.get_by_role("button", name="Use these cameras").click()
+        page.get_by_text("trial.toml is written").wait_for()
+    assert [camera.get("fields") for camera in read_toml(folder / "trial.toml")["camera"]] == [None, "auto", None]

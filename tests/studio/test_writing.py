@@ -56,6 +56,48 @@ def test_the_last_versions_are_kept(editor, tmp_path):
     assert not list(tmp_path.glob("*.part"))
 
 
+def test_what_others_changed_stands_in_the_way_of_no_other_file(editor, tmp_path):
+    editor.write("b.csv", "1", "other click")
+    editor.write("a.csv", "1", "click")
+    editor.write("a.csv", "2", "click")
+    (tmp_path / "a.csv").write_text("by hand")
+    with pytest.raises(TrialError, match="can no longer be undone"):
+        editor.undo()
+    assert editor.undo() == "other click (b.csv)"
+    assert not (tmp_path / "b.csv").exists()
+
+
+def test_what_a_command_writes_is_kept_and_undone(editor, tmp_path):
+    path, has_ended = tmp_path / "trial.toml", []
+    editor.write("trial.toml", "a = 1\n", "first")
+    editor.expect("trial.toml", "offsets found", lambda: bool(has_ended))
+    editor.write("trial.toml", "a = 2\n", "meanwhile")
+    path.write_text("a = 2\noffset_s = 0.1\n")
+    has_ended.append(True)
+    assert editor.undo() == "offsets found (trial.toml)"
+    assert path.read_text() == "a = 2\n"
+    assert (editor.undo(), editor.undo()) == ("meanwhile (trial.toml)", "first (trial.toml)")
+    for _ in range(3):
+        editor.redo()
+    assert path.read_text() == "a = 2\noffset_s = 0.1\n"
+
+
+def test_a_file_that_a_command_overwrites_keeps_its_earlier_version(editor, tmp_path):
+    path = tmp_path / "calib_studio.toml"
+    path.write_text("old cameras")
+    editor.expect(path.name, "cameras calibrated", lambda: True)
+    path.write_text("new cameras")
+    assert [each.read_text() for each in (tmp_path / FOLDER / "versions").iterdir()] == ["old cameras"]
+    editor.undo()
+    assert path.read_text() == "old cameras"
+
+
+def test_a_command_that_writes_nothing_is_no_edit(editor):
+    editor.expect("trial.toml", "offsets found", lambda: True)
+    editor.settle()
+    assert editor.last is None
+
+
 @pytest.mark.parametrize("name", ["../a.toml", "/tmp/a.toml", "link.toml", "inside/../../a.toml"])
 def test_nothing_is_written_outside_the_folder(tmp_path, name):
     folder = tmp_path / "trial"

@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -16,6 +17,8 @@ import numpy as np
 import pytest
 
 from airborne.cli import main
+from airborne.io.folder_lock import LOCK
+from airborne.studio.writing import FOLDER
 
 RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 _FORKS = multiprocessing.get_context("forkserver")
@@ -59,6 +62,12 @@ def fork_studio(path: Path, *options: str) -> Iterator[str]:
             said = complained.read()
             process.join(timeout=30)
     assert "Traceback" not in said, said
+
+
+def kill_studio(folder: Path) -> None:
+    """Kill the studio that has a folder open, as a crash does."""
+    holder = (folder / FOLDER / LOCK).read_text()
+    os.kill(int(re.search(r"process (\d+)", holder)[1]), signal.SIGKILL)
 
 
 def _address(printed: IO[str], complained: IO[str]) -> str:

@@ -1,4 +1,6 @@
-"""An editing session of the studio that is killed: points clicked, the start set, frames turned, each told when done.
+"""An editing session of the studio that is killed: points clicked, the start set, a draft kept, frames turned.
+
+Each is told when it is done.
 
 `python -m tests.support.studio_edits FOLDER` edits the trial of a folder until the process ends.
 """
@@ -26,6 +28,7 @@ def edit_on(folder: Path) -> None:
         clicked = known.click(known.names[0], "cam1", (number % WIDTH, number // WIDTH))
         session.edit(TABLE, clicked.text(("cam1", "cam2", "cam3")), f"click {number}")
         session.set_table("start", {"frame": number}, f"start {number}")
+        session.keep_draft("points", number, f"draft {number}")
         session.go(page=PAGE, frame=number)
         print(number, flush=True)
 
@@ -41,15 +44,15 @@ def kill_while_editing(folder: Path, longest_s: float, rng: random.Random) -> in
     return int([line for line in told if line.endswith("\n")][-1])
 
 
-def edits_found(folder: Path) -> tuple[int, int, int]:
-    """Open the folder again: the click that its table holds, the start's frame, and the frame in view."""
+def edits_found(folder: Path) -> tuple[int, int, int, int]:
+    """Open the folder again: the click that its table holds, the start's frame, the draft, and the frame in view."""
     session = Session(folder, folder / TRIAL)
     project = read_project(folder, folder / TRIAL)
     assert project.mistake is None, project.mistake
     assert session.place.page == PAGE
     clicked = read_clicked(folder / TABLE)
     u, v = clicked.at(clicked.names[0], "cam1")
-    return int(v) * WIDTH + int(u), project.table("start")["frame"], session.frame
+    return int(v) * WIDTH + int(u), project.table("start")["frame"], session.draft("points"), session.frame
 
 
 if __name__ == "__main__":

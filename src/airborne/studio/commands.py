@@ -25,6 +25,7 @@ class Command:
         self.words = tuple(words)
         self.started_s = time.monotonic()
         self._out: bytes = b""
+        self.is_told = False  # a page has shown what came of it
         self._log = folder / FOLDER / f"{words[0]}_{next(_numbers)}.log"
         self._log.parent.mkdir(exist_ok=True)
         with self._log.open("wb") as log:

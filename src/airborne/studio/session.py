@@ -11,6 +11,7 @@ from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
 from airborne.run.opening import calibrated_cameras
 from airborne.studio.commands import Command
+from airborne.studio.drafts import DRAFTS, drafts_text, read_draft
 from airborne.studio.pictures import Pictures, ShownTrial
 from airborne.studio.place import LastView, read_place, write_place
 from airborne.studio.project import Project, read_project
@@ -38,7 +39,7 @@ class Session:
 
     @property
     def frame(self) -> int:
-        """The frame in view."""
+        """The frame that was in view last, in any window: a page opens there; what is done to one is its view's."""
         return self.place.frame
 
     def go(self, *, page: str | None = None, frame: int | None = None) -> None:
@@ -75,7 +76,7 @@ class Session:
             raise TrialError("the cameras are not calibrated yet; see the step Cameras")
         files = [project.file(str(table[key])) for key in ("file", "control_points") if key in table]
         stamp = project.cameras_stamp, repr(table), tuple(map(_stamp, files))
-        return self._keep("rig", stamp, lambda: calibrated_cameras(self._draft(), self.shown().sizes)[0])
+        return self._keep("rig", stamp, lambda: calibrated_cameras(self._as_far_as_cameras(), self.shown().sizes)[0])
 
     def edit(self, name: str, text: str, what: str) -> None:
         """Write a file of the folder."""
@@ -89,7 +90,16 @@ class Session:
         """Set values in a table of the trial; None takes a key away."""
         self.edit_trial(lambda text: with_table(text, head, values), what)
 
-    def _draft(self) -> Trial:
+    def draft(self, name: str) -> Any:
+        """Return what was kept of a draft last; None where there is none."""
+        return read_draft(self.folder, self.path.name, name)
+
+    def keep_draft(self, name: str, draft: Any, what: str) -> None:
+        """Keep a draft, an edit like all others."""
+        (self.folder / FOLDER).mkdir(exist_ok=True)
+        self.edit(DRAFTS, drafts_text(self.folder, self.path.name, name, draft), what)
+
+    def _as_far_as_cameras(self) -> Trial:
         """Return the trial as far as its cameras go, whatever else is missing."""
         project = self.project()
         trial = Trial(

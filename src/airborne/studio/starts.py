@@ -16,8 +16,10 @@ from airborne.run.players_tracker import player_starts
 from airborne.studio.clicks import Clicked, read_clicked
 from airborne.studio.session import Session
 from airborne.studio.stage import middle_of_view
+from airborne.studio.writing import read_if_there
 from airborne.tracking.first_pose import fit_to_pixels, pose_by_hand
 from airborne.tracking.players import PlayerStart
+from airborne.trial.start import StartTable
 
 POSE_COLOUR = "#f0e442"
 _BY_HAND = ("position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg")
@@ -30,6 +32,7 @@ _WAYS = (
     "detections",
     "detections_cameras",
 )  # a start has one of them
+_DRAFT = "start"  # its name among the drafts
 
 
 def points_name(frame: int) -> str:
@@ -97,6 +100,48 @@ def standing_pose(model: BodyModel, rig: Rig) -> Pose:
 def write_start(session: Session, start: dict[str, Any]) -> None:
     """Write a [start] into the trial, in the place of any other. Raises TrialError."""
     session.set_table("start", {**dict.fromkeys(_WAYS), **start}, "first pose set")
+
+
+def keep_start(session: Session, start: dict[str, Any], what: str) -> None:
+    """Keep a [start] that is made on the page until it is used."""
+    draft = {"start": start, "over": session.project().table("start"), "clicks": _clicks_text(session, start)}
+    session.keep_draft(_DRAFT, draft, what)
+
+
+def has_start(session: Session, start: dict[str, Any]) -> bool:
+    """Whether the trial has this [start]."""
+    table = session.project().table("start")
+    return all(table.get(key) == value for key, value in start.items())
+
+
+def drafted_start(session: Session) -> dict[str, Any] | None:
+    """Return the [start] that was made on a page last; None where there is none, or the trial got another since."""
+    draft = session.draft(_DRAFT)
+    try:
+        start, over = draft["start"], draft["over"]
+        StartTable(**start)
+    except (KeyError, TypeError, ValueError):
+        return None
+    return start if over == session.project().table("start") or has_start(session, start) else None
+
+
+def is_newer_than_clicks(session: Session, start: dict[str, Any]) -> bool:
+    """Whether the landmarks of its frame are clicked as they were when the drafted [start] was made."""
+    return session.draft(_DRAFT).get("clicks") == _clicks_text(session, start)
+
+
+def drafted_pose(model: BodyModel, start: dict[str, Any] | None) -> Pose | None:
+    """Return the pose of a drafted [start]; None where it is none of this body."""
+    if start is None or "position_m" not in start:
+        return None
+    try:
+        return pose_of(model, start)
+    except (AirborneError, KeyError, ValueError):
+        return None
+
+
+def _clicks_text(session: Session, start: dict[str, Any]) -> str | None:
+    return read_if_there(session.folder / points_name(start["frame"]))
 
 
 def fit_clicks(model: BodyModel, rig: Rig, clicked: Clicked) -> tuple[Pose | None, str]:

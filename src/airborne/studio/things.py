@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomlkit
 
 from airborne.errors import BodyError
-from airborne.io.text import read_toml
+from airborne.io.text import parse_toml
 from airborne.types import Image
 
 MESHES = (".obj", ".ply", ".stl")
@@ -59,15 +58,15 @@ def _part(solid: Solid) -> dict[str, Any]:
     return {"name": solid.name, **shape, **place, **colour}
 
 
-def read_thing(path: Path) -> tuple[str, list[Solid]]:
-    """Read a thing back. Raises BodyError for a body file that is more than solids in one piece."""
+def parse_thing(text: str, file: str) -> tuple[str, list[Solid]]:
+    """Read a thing back from its body file's text. Raises BodyError for what is more than solids in one piece."""
     try:
-        document = read_toml(path)
+        document = parse_toml(text)
         (segment,) = document["segment"]
         solids = [_solid(part) for part in segment["part"]]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise BodyError(f"{path.name} is more than solids in one piece; change it with an editor") from None
-    return str(document["name"]), solids
+        return str(document["name"]), solids
+    except (ValueError, KeyError, TypeError):
+        raise BodyError(f"{file} is more than solids in one piece; change it with an editor") from None
 
 
 def _solid(part: dict[str, Any]) -> Solid:

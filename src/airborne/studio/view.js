@@ -134,7 +134,9 @@ export default {
     },
     send() {
       [this.pulling, this.pull] = [this.pull, null];
-      if (this.pulling) this.$emit("drag", this.pulling);
+      if (!this.pulling) return;
+      this.$emit("drag", this.pulling);
+      if (this.pulling.frame !== this.seen()) this.$emit("frame", { frame: this.seen() }); // that was of the one before
     },
     follow(n, marks, items) { // the server's answer
       const answered = this.pulling;

@@ -44,6 +44,7 @@ class Drag:
     """A movement of the pointer that holds the body, or a mark."""
 
     number: int  # of the drag, which has many movements
+    frame: int  # in whose pictures it is made
     pane: int  # number of the camera
     start: tuple[float, float]  # where the body was taken [px]
     px: tuple[float, float]  # where the pointer has it now
@@ -90,7 +91,7 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         self._props["label"] = f"pictures of {', '.join(shown.names)}"
         self._props["picking"] = False
         self.show_over((), ())
-        self._frame, self._turn_to = frame, on_frame
+        self._frame, self._turn_to = min(frame, n_frames - 1), on_frame
         self._listen("frame", on_frame, lambda args: (int(args["frame"]),))
         self._listen(
             "pick", on_pick, lambda args: (int(args["pane"]), float(args["u"]), float(args["v"]), args["near"])
@@ -100,6 +101,11 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         self._props["follows"] = on_drag is not None
         self._listen("drag", on_drag, lambda args: (_read_drag(args),))
         FrameBar(self, n_frames, min(frame, n_frames - 1))
+
+    @property
+    def frame(self) -> int:
+        """The frame in view here; another window's is its own."""
+        return self._frame
 
     def _listen(self, name: str, handler: Callable[..., Any] | None, read: Callable[[dict], tuple]) -> None:
         if handler is None:
@@ -137,6 +143,10 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         """Show a frame, in every part of the page."""
         self.run_method("show", frame)
 
+    def lead(self, frame: int, *, anew: bool) -> None:
+        """Show a frame as the next of a row that `anew` begins; not while the user looks at another."""
+        self.run_method("lead", frame, anew)
+
 
 async def _finish(result: Any) -> None:
     if isawaitable(result):
@@ -147,6 +157,7 @@ def _read_drag(args: dict) -> Drag:
     (x, y), mark = args["from"], args["id"]
     return Drag(
         number=int(args["n"]),
+        frame=int(args["frame"]),
         pane=int(args["pane"]),
         start=(float(x), float(y)),
         px=(float(args["u"]), float(args["v"])),

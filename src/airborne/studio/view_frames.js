@@ -15,6 +15,11 @@ export default {
     }
   },
   show(frame) { this.go(frame); },
+  lead(frame, anew) { // as `show`, while nobody has gone elsewhere since it led last
+    const follows = anew || this.wanted === this.led;
+    this.led = frame;
+    if (follows) this.go(frame);
+  },
   async fetchPane(pane, frame, shrink, signal, more = "") {
     const answer = await fetch(`${pane.url.replace("{frame}", frame)}&shrink=${shrink}${more}`, { signal });
     const picture = answer.status === 200 ? await createImageBitmap(await answer.blob()) : null;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +31,16 @@ class Edit:
         return f"{self.what} ({self.path.name})"
 
 
+@dataclass(slots=True)
+class _Writer:
+    """A command of ours that will write a file."""
+
+    what: str  # it is for, in the user's words
+    path: Path
+    before: str | None  # what the file holds until then
+    has_ended: Callable[[], bool]
+
+
 class Editor:
     """Writes the files of one folder and remembers its edits, to undo and redo them."""
 
@@ -38,9 +49,11 @@ class Editor:
         self.folder = folder
         self._done: list[Edit] = []
         self._undone: list[Edit] = []
+        self._writers: list[_Writer] = []
 
     def write(self, name: str, text: str, what: str) -> None:
         """Write a text file of the folder; raises TrialError for a name that leads out of it."""
+        self.settle()
         path = self.folder / name
         edit = Edit(what, path, read_if_there(path), text)
         if edit.before == text:
@@ -48,6 +61,21 @@ class Editor:
         self._replace(path, text)
         self._done.append(edit)
         self._undone.clear()
+
+    def expect(self, name: str, what: str, has_ended: Callable[[], bool]) -> None:
+        """Keep a file that a command is about to write; once it has ended, what it wrote is an edit like all others."""
+        path = self.folder / name
+        _keep(self.folder / FOLDER / "versions", path)
+        self._writers.append(_Writer(what, path, read_if_there(path), has_ended))
+
+    def settle(self) -> None:
+        """Take in what commands that have ended wrote."""
+        for writer in [each for each in self._writers if each.has_ended()]:
+            self._writers.remove(writer)
+            after = read_if_there(writer.path)
+            if after != writer.before:
+                self._done.append(Edit(writer.what, writer.path, writer.before, after))
+                self._undone.clear()
 
     @property
     def last(self) -> str | None:
@@ -68,12 +96,18 @@ class Editor:
         return self._move(self._undone, self._done, "redo")
 
     def _move(self, source: list[Edit], target: list[Edit], verb: str) -> str:
+        self.settle()
         if not source:
             raise TrialError(f"there is nothing to {verb}")
         edit = source[-1]
         present, text = (edit.after, edit.before) if verb == "undo" else (edit.before, edit.after)
         if read_if_there(edit.path) != present:
-            raise TrialError(f"{edit.path.name} was changed elsewhere since; its earlier versions are in {FOLDER}")
+            for edits in (source, target):
+                edits[:] = [each for each in edits if each.path != edit.path]
+            raise TrialError(
+                f"{edit.path.name} was changed elsewhere since, so its edits here can no longer be undone; "
+                f"its earlier versions are in {FOLDER}/versions"
+            )
         self._replace(edit.path, text)
         target.append(source.pop())
         return edit.says
@@ -82,6 +116,9 @@ class Editor:
         if not path.resolve().is_relative_to(self.folder.resolve()) or path.is_symlink():
             raise TrialError(f"{path} leads out of {self.folder}; nothing is written there: remove the link")
         _keep(self.folder / FOLDER / "versions", path)
+        for writer in self._writers:
+            if writer.path == path:
+                writer.before = text
         if text is None:
             path.unlink(missing_ok=True)
             return

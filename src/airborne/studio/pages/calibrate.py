@@ -119,7 +119,7 @@ class CalibratePanel:
 
     def _start(self, source: dict[str, Any], media: dict[str, dict[str, Any]]) -> None:
         self.session.edit(SOURCES, sources_text(self.session.project(), source, media), "sources of a calibration")
-        self.watch.start("calibrate", SOURCES, "-o", CALIBRATED)
+        self.watch.start("calibrate", SOURCES, "-o", CALIBRATED, writes=CALIBRATED, what="cameras calibrated")
 
     def _video_choices(self) -> None:
         names = [path.name for path in list_videos(self.session.folder)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -99,7 +100,8 @@ class PlayersPanel(PointsPanel):
     async def add(self) -> None:
         """Begin with another player."""
         try:
-            name = check_column((self.new.value or f"player{len(self.players) + 1}").strip())
+            unused = (f"player{n}" for n in itertools.count(1) if f"player{n}" not in self.players)
+            name = check_column((self.new.value or next(unused)).strip())
         except ValueError as error:
             complain(str(error))
             return

@@ -16,13 +16,18 @@ from airborne.studio.pages.fit_pose import FitButton
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, PointsPanel
-from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
+from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import (
     POSE_COLOUR,
+    drafted_pose,
+    drafted_start,
     fit_clicks,
+    has_start,
+    is_newer_than_clicks,
+    keep_start,
     points_name,
     read_points,
     read_pose,
@@ -51,6 +56,7 @@ class ClickPanel(PointsPanel):
         self.rig, self.model, self.frame = rig, model, frame
         self.hand = PoseHand(model, rig.select(shown.names).cameras, lambda pose: None)
         self.is_by_hand = False  # the pose, not fitted to the clicks
+        self.kept: dict[str, Any] | None = None  # the [start] of the pose that was made by hand in this frame
         self.outline: list[dict[str, Any]] = []  # of the pose
         self.says = ""
 
@@ -77,23 +83,36 @@ class ClickPanel(PointsPanel):
                     ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
                     ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                     FitButton(self.session, self.hand, lambda: self.frame, self.take_pose)
-                    self.stage = PoseStage(self.rig, self.hand, self.take_pose)
+                    self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
                 self.list = PointList(self.shown.names, self.choose)
-        self.show()
-        await self.reread()
+        await self.show_frame()
         stored = read_pose(self.session, self.model)
-        if stored is not None and stored[0] == self.frame:
-            await self.place(stored[1], "The outline is the pose that the trial has.")
+        if stored is not None and stored[0] == self.frame and (self.kept is None or has_start(self.session, self.kept)):
+            self.place(stored[1], STORED)
 
-    async def begin_by_hand(self) -> None:
+    async def show_frame(self) -> None:
+        """Show the clicks of the frame in view, and the pose made by hand in it since, or fitted to them."""
+        await self.hand.place_next(None)
+        self.frame = self.view.frame
+        self.selected, self.outline, self.says, self.is_by_hand = None, [], "", False
+        self.clicked = Clicked((), None, {})
+        with errors_shown():
+            self.clicked, self.kept = read_points(self.session, self.frame), self._drafted()
+        pose = drafted_pose(self.model, self.kept)
+        if pose is None:
+            await self.solve()
+        else:
+            self.place(pose, KEPT)
+
+    def begin_by_hand(self) -> None:
         """Show the body upright where the cameras look, to be dragged."""
-        await self.place(standing_pose(self.model, self.rig), "Drag the body, its limbs, and with Shift its turn.")
+        self.hand.place(standing_pose(self.model, self.rig))
+        self.take_pose("Drag the body, its limbs, and with Shift its turn.", "body placed by hand")
 
-    async def place(self, pose: Pose, says: str) -> None:
+    def place(self, pose: Pose, says: str) -> None:
         """Show a pose that is not fitted to the clicks."""
         self.hand.place(pose)
-        self.is_by_hand, self.says, self.outline = True, says, self.hand.items()
-        self.show()
+        self.show_pose(says)
 
     async def drag(self, drag: Drag) -> None:
         """Let the body follow the pointer; a click that is dragged is moved at the end."""
@@ -103,32 +122,46 @@ class ClickPanel(PointsPanel):
         elif drag.has_ended and drag.mark is not None:
             await self.move(drag.mark, *drag.px)
 
-    def take_pose(self, says: str = "The pose was set by hand.") -> None:
+    def show_pose(self, says: str = SET_BY_HAND) -> None:
         """Show the pose that the hand holds, which is not fitted to the clicks."""
         self.is_by_hand, self.says, self.outline = True, says, self.hand.items()
         self.show()
 
+    def take_pose(self, says: str = SET_BY_HAND, what: str = "pose set by hand") -> None:
+        """Keep the pose that the hand holds, and show it; it is not fitted to the clicks."""
+        if self.hand.pose is None:
+            return
+        with errors_shown():
+            keep_start(self.session, start_from_pose(self.model, self.frame, self.hand.pose), what)
+            self.kept = self._drafted()
+        self.show_pose(says)
+
+    def _drafted(self) -> dict[str, Any] | None:
+        """Return the [start] that was made by hand in the frame in view, after its clicks."""
+        start = drafted_start(self.session)
+        if start is None or start["frame"] != self.frame or not is_newer_than_clicks(self.session, start):
+            return None
+        return start
+
     async def turn_to(self, frame: int) -> None:
         """Show the clicks of another frame."""
         if frame != self.frame:
-            self.frame = frame
             self.session.go(frame=frame)
-            self.selected, self.outline, self.says = None, [], ""
-            self.hand.place(None)
-            self.show()
-            await self.reread()
+            await self.show_frame()
 
     async def reread(self) -> None:
-        """Show the clicks that the frame's table holds now: undo or another window may have changed it."""
+        """Show the clicks and the pose that are kept of the frame now: undo or another window may have changed them."""
         with errors_shown():
             clicked = read_points(self.session, self.frame)
-            if clicked.text(self.shown.names) != self.clicked.text(self.shown.names):
+            if self._drafted() != self.kept:
+                await self.show_frame()
+            elif clicked.text(self.shown.names) != self.clicked.text(self.shown.names):
                 self.clicked = clicked
                 await self.solve()
 
     async def solve(self) -> None:
         """Fit the body to the clicks, or say what is missing; the clicks are shown at once."""
-        self.is_by_hand, self.says = False, "fitting the body" if self.clicked.names else ""
+        self.is_by_hand, self.kept, self.says = False, self._drafted(), "fitting the body" if self.clicked.names else ""
         self.show()
         if not self.clicked.names:
             return

@@ -51,10 +51,12 @@ class CommandWatch:
         """Whether it goes on."""
         return self.command is not None and self.command.is_running
 
-    def start(self, *words: str) -> None:
-        """Start `airborne` with these words, unless it runs."""
+    def start(self, *words: str, writes: str = "", what: str = "") -> None:
+        """Start `airborne` with these words, unless it runs; what it `writes` of the trial's files can be undone."""
         if not self.is_running:
-            self.session.commands[self.name] = Command(words, self.session.folder)
+            self.session.commands[self.name] = command = Command(words, self.session.folder)
+            if writes:
+                self.session.editor.expect(writes, what, lambda: not command.is_running)
             self._show()
 
     async def stop(self) -> None:

@@ -41,11 +41,16 @@ class Correction:
         self.hand = PoseHand(run_body(folder), cameras, lambda pose: self._marks(pose, {}))
         self._seen = self._tracked = self._held()  # when this window looked last; when it last tracked
 
+    @property
+    def frame(self) -> int:
+        """The frame in view in this window."""
+        return self.session.frame if self.view is None else self.view.frame
+
     def build(self) -> None:
         """Lay out the switch, and what leaves a camera out."""
         with ui.element("div").classes("row-line"):
-            self.switch = ui.switch("Correct", on_change=lambda: self.turn_to(self.session.frame))
-        self.masks = MaskPanel(self.session, self.shown, self._note_change)
+            self.switch = ui.switch("Correct", on_change=lambda: self.turn_to(self.frame))
+        self.masks = MaskPanel(self.session, self.shown, lambda: self.frame, self._note_change)
         self.masks.area.bind_visibility_from(self.switch, "value")
 
     def build_watch(self) -> None:
@@ -56,12 +61,12 @@ class Correction:
             self.watch.buttons = [self.again]
         self.again.set_visibility(False)
 
-    def turn_to(self, frame: int) -> None:
+    async def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""
         if self.view is None:
             return
         with errors_shown():
-            self.hand.place(run_rows(self.folder).pose(frame) if self.switch.value else None)
+            await self.hand.place_next(run_rows(self.folder).pose(frame) if self.switch.value else None)
             self._show(frame)
 
     async def reread(self) -> None:
@@ -69,12 +74,12 @@ class Correction:
         self.masks.list.refresh()
         held = self._held()
         if held == self._seen:
-            self._show(self.session.frame)
+            self._show(self.frame)
             return
         self._seen = held
         self.watch.says.set_text("" if held == self._tracked else "the corrections have changed")
         self.again.set_visibility(held != self._tracked)
-        self.turn_to(self.session.frame)
+        await self.turn_to(self.frame)
 
     def _held(self) -> tuple[Any, Any]:
         """Return the keys and masks that the trial holds."""
@@ -90,7 +95,7 @@ class Correction:
     def move(self, mark: str, u: float, v: float) -> None:
         """Write where a joint is as a click of the frame's key."""
         name, camera = mark.rsplit("|", 1)
-        self._write({name: np.array([u, v])}, camera, name)
+        self._write(self.frame, {name: np.array([u, v])}, camera, name)
 
     async def drag(self, drag: Drag) -> None:
         """Let the body follow the pointer; at the end, write what was moved into the frame's key."""
@@ -99,35 +104,36 @@ class Correction:
         camera, pose, grip = self.hand.cameras[drag.pane], self.hand.pose, self.hand.grip
         assert pose is not None and grip is not None
         if drag.mark is not None:
-            self.move(drag.mark, *drag.px)
+            name = drag.mark.rsplit("|", 1)[0]
+            self._write(drag.frame, {name: np.array(drag.px)}, camera.name, name)
         elif drag.turns:
-            self._write_turn(pose)
+            self._write_turn(drag.frame, pose)
         else:
             names = landmarks_of_grip(self.hand.model, grip)
             clicks = landmarks_px(self.hand.model, pose, camera, names)
-            self._write(dict(clicks), camera.name, self.hand.model.segments[grip.segment].name)
+            self._write(drag.frame, dict(clicks), camera.name, self.hand.model.segments[grip.segment].name)
 
-    def _write_turn(self, pose: Pose) -> None:
+    def _write_turn(self, frame: int, pose: Pose) -> None:
         """Write the body's orientation into the frame's key."""
         x, y, z, w = (round(float(each), 5) for each in pose.world_from_root.rotation.as_quat())
         others = {"rotation_matrix": None, "somersault_tilt_twist_deg": None}
-        frame, values = self.session.frame, {**others, "quaternion_xyzw": [x, y, z, w]}
+        values = {**others, "quaternion_xyzw": [x, y, z, w]}
         sd = _default_sd("sd_deg")
-        self._edit(lambda text: with_key(text, frame, values), f"body turned, frame {frame}", f", ± {sd:g}°")
+        self._edit(frame, lambda text: with_key(text, frame, values), f"body turned, frame {frame}", f", ± {sd:g}°")
 
-    def _write(self, clicks: dict[str, Array], camera: str, what: str) -> None:
+    def _write(self, frame: int, clicks: dict[str, Array], camera: str, what: str) -> None:
         """Write where a camera sees landmarks of the body into the frame's key."""
-        frame, sd_px = self.session.frame, _default_sd("sd_px")
+        sd_px = _default_sd("sd_px")
         view = next(each for each in self.hand.cameras if each.name == camera)
         plain = {name: px.tolist() for name, px in clicks.items()}
         self._edit(
+            frame,
             lambda text: with_clicks(text, frame, camera, plain),
             f"{what} corrected in {camera}, frame {frame}",
             f", ± {sd_px:g} px{_across(view, self.hand.pose, sd_px)}",
         )
 
-    def _edit(self, change: Callable[[str], str], what: str, sd: str) -> None:
-        frame = self.session.frame
+    def _edit(self, frame: int, change: Callable[[str], str], what: str, sd: str) -> None:
         with errors_shown():
             trial = self.session.project().trial()
             if frame <= trial.start.frame:
@@ -142,7 +148,7 @@ class Correction:
         self._seen = self._held()
         self.watch.says.set_text(what)
         self.again.set_visibility(True)
-        self._show(self.session.frame)
+        self._show(self.frame)
 
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""
@@ -150,12 +156,12 @@ class Correction:
         self.watch.start("track", self.session.path.name, "-o", self.folder.name, "--resume")
         self.again.set_visibility(False)
 
-    def show_anew(self, command: Command) -> None:
+    async def show_anew(self, command: Command) -> None:
         """Show what came of it."""
         self.watch.says.set_text("tracked again")
         if self.view is not None:
             self.view.run_method("refresh")
-        self.turn_to(self.session.frame)
+        await self.turn_to(self.frame)
 
     def _clicks_of_key(self, frame: int) -> dict[str, Any]:
         """Return the clicks that the frame's key holds: landmark -> camera -> (2,) [px]."""

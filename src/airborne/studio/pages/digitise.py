@@ -43,6 +43,7 @@ _HELP = (
     "from your own clicks before and after. For an unbiased comparison with a run, leave the epipolar help off."
 )
 _EMPTY = "There are no points to click yet. Name one below, such as one end of the body, and press Add."
+_DRAFT = "points"  # their name among the drafts
 _PREDICTED = "#c8cdd3"
 _AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing"}
 
@@ -70,13 +71,13 @@ class DigitisePanel(PointsPanel):
 
     def __init__(self, session: Session, shown: ShownTrial, model: BodyModel | None) -> None:
         """Begin with the clicks that lie in the folder, or with none."""
+        super().__init__(session, shown, Clicked((), None, {}), "")
         known = list_repetitions(session.folder)
         self.who = known[-1] if known else Repetition("A", 1)
         self.model, self.frame = model, session.frame
-        self.extra: list[str] = []  # points that were named here
+        self.extra = self._kept()  # points that were named here
         self.rig: Rig | None = None  # for the epipolar help
         self.then = "point"
-        super().__init__(session, shown, Clicked((), None, {}), "")
         self.table = self._read()
         self.chosen = self.names[0] if self.names else ""
         self.clicked = self._of_frame()
@@ -153,9 +154,13 @@ class DigitisePanel(PointsPanel):
     async def reread(self) -> None:
         """Show the clicks that the table holds now: undo or another window may have changed it."""
         with errors_shown():
+            extra, self.extra = self.extra, self._kept()
             table = self._read()
             cameras = self.shown.names
-            if format_clicked_frames(table, cameras) != format_clicked_frames(self.table, cameras):
+            if extra != self.extra and self.chosen not in table.points:
+                self.chosen, self.selected = next(iter(table.points), ""), None
+            before, now = (format_clicked_frames(each, cameras) for each in (self.table, table))
+            if extra != self.extra or before != now:
                 self.table, self.clicked = table, clicks_of_frame(table, self.frame, cameras)
                 self.show()
 
@@ -200,7 +205,10 @@ class DigitisePanel(PointsPanel):
         if not name.replace("_", "").replace("-", "").isalnum() or len(name) > 40:
             complain("a point's name is 1 to 40 letters, digits, hyphens and underscores")
             return
-        self.extra.append(name)
+        if name not in self.names:
+            with errors_shown():
+                self.session.keep_draft(_DRAFT, [*self.extra, name], f"{name} added to the points")
+                self.extra = self._kept()
         self.table = add_points(self.table, [name])
         self.clicked = self._of_frame()
         await self.choose(name)
@@ -261,6 +269,10 @@ class DigitisePanel(PointsPanel):
 
     def _set_then(self, event) -> None:
         self.then = event.value
+
+    def _kept(self) -> list[str]:
+        draft = self.session.draft(_DRAFT)
+        return [name for name in draft if isinstance(name, str)] if isinstance(draft, list) else []
 
     def _read(self):
         points = (*default_points(self.model), *self.extra)

@@ -17,6 +17,7 @@ from airborne.run.find import describe_probability
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.session import Session
+from airborne.studio.starts import has_start
 from airborne.studio.writing import FOLDER
 
 
@@ -58,26 +59,27 @@ class FindControls:
         if command.code == 0:
             found = json.loads(command.output())
             self.candidates = ()
-            self.says = f"Found in frame {found['frame']}, {describe_probability(found['probability'])}."
-            await self.show(found)
+            says = f"Found in frame {found['frame']}, {describe_probability(found['probability'])}."
         else:
             document = read_json(self.session.folder / FOLDER / "find" / CANDIDATES)
             self.candidates = tuple({**each, "frame": document["frame"]} for each in document["candidates"])
-            self.says = "The pictures do not decide between these; choose the right one."
-            await self.show(self.candidates[0])
+            found, says = self.candidates[0], "The pictures do not decide between these; choose the right one."
+        if not command.is_told:  # else what was made of it since is the draft
+            command.is_told, self.says = True, says
+            await self.show(found)
         self.choices.refresh()
 
-    def tell(self, start: dict[str, Any]) -> None:
-        """Take the [start] that is in view now, and say whether the trial has it."""
+    def tell(self, start: dict[str, Any] | None) -> None:
+        """Take the [start] that is in view now, None for none, and say whether the trial has it."""
         self.start = start
         self.say()
 
     def say(self) -> None:
         """Say what is in view, and whether the trial has it now."""
-        if self.start is not None:
-            table = self.session.project().table("start")
-            is_used = all(table.get(key) == value for key, value in self.start.items())
-            state = "The trial has it." if is_used else f"Not yet used: press {self.use}."
+        if self.start is None:
+            self.note.set_text("")
+        else:
+            state = "The trial has it." if has_start(self.session, self.start) else f"Not yet used: press {self.use}."
             self.note.set_text(f"{self.says} {state}")
 
     def _list_candidates(self) -> None:

@@ -14,6 +14,7 @@ from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
+from airborne.studio.starts import drafted_start, keep_start
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import CameraViews
 
@@ -34,6 +35,7 @@ class FindPlayersPanel:
     frame: int  # in view
     at: int = -1  # the frame of the players
     joints_m: dict[str, dict[str, list[float]]] = field(default_factory=dict)  # player -> joint -> position
+    kept: dict[str, Any] | None = None  # the [start] of these players, as it is kept
 
     async def build(self) -> None:
         """Lay out the pictures and what can be done."""
@@ -46,10 +48,20 @@ class FindPlayersPanel:
                 self.controls.build()
                 self.use = ui.button(_USE, on_click=self.write).props("unelevated")
         self.use.set_visibility(False)
+        if (start := self._drafted()) is not None:
+            self.show_players(start)
 
     async def reread(self) -> None:
-        """Say whether the trial has what is in view."""
+        """Show who is kept now, and say whether the trial has them: undo or another window may have changed it."""
+        if (kept := self._drafted()) != self.kept:
+            self.controls.says = ""
+            self.show_players(kept)
         self.controls.say()
+
+    def _drafted(self) -> dict[str, Any] | None:
+        start = drafted_start(self.session)
+        players = [] if start is None else start.get("player") or []
+        return start if players and all("joints_m" in each for each in players) else None
 
     def turn_to(self, frame: int) -> None:
         """Show the players in their own frame only."""
@@ -63,13 +75,23 @@ class FindPlayersPanel:
 
     async def show_found(self, each: dict[str, Any]) -> None:
         """Show players who were found, ready to be used."""
-        self.at = int(each["frame"])
-        self.joints_m = {player["name"]: player["joints_m"] for player in each.get("player") or each["players"]}
+        players = each.get("player") or each["players"]
+        players = [{"name": player["name"], "joints_m": player["joints_m"]} for player in players]
+        start = {"frame": int(each["frame"]), "player": players}
+        with errors_shown():
+            keep_start(self.session, start, "players found")
+        self.show_players(start)
+
+    def show_players(self, start: dict[str, Any] | None) -> None:
+        """Show the players of a [start], ready to be used, or nobody."""
+        self.kept = start
+        self.at = -1 if start is None else int(start["frame"])
+        self.joints_m = {} if start is None else {each["name"]: each["joints_m"] for each in start["player"]}
         self.use.set_visibility(bool(self.joints_m))
-        self.view.go(self.at)
-        self.turn_to(self.at)
-        players = [{"name": name, "joints_m": joints_m} for name, joints_m in self.joints_m.items()]
-        self.controls.tell({"frame": self.at, "player": players})
+        if start is not None:
+            self.view.go(self.at)
+        self.turn_to(self.frame if start is None else self.at)
+        self.controls.tell(start)
 
     def write(self) -> None:
         """Write the players into the trial."""

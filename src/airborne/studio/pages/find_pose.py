@@ -12,11 +12,20 @@ from airborne.cameras import Rig
 from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.fit_pose import FitButton
 from airborne.studio.pages.layout import errors_shown
-from airborne.studio.pages.pose_hand import DRAG_HELP, PoseHand
+from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import pose_of, read_pose, standing_pose, start_from_pose, write_start
+from airborne.studio.starts import (
+    drafted_pose,
+    drafted_start,
+    keep_start,
+    pose_of,
+    read_pose,
+    standing_pose,
+    start_from_pose,
+    write_start,
+)
 from airborne.studio.view import CameraViews, Drag
 
 _HELP = "The body is looked for where it stands out from the empty scene, which takes a minute or two."
@@ -49,15 +58,34 @@ class FindPanel:
                 ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                 self.use = ui.button(_USE, on_click=self.write).props("unelevated")
                 FitButton(self.session, self.hand, lambda: self.at, self.take_pose)
-                self.stage = PoseStage(self.rig, self.hand, self.take_pose)
-        self.use.set_visibility(False)
-        if (stored := read_pose(self.session, self.model)) is not None:
+                self.stage = PoseStage(self.rig, self.hand, lambda: self.turn_to(self.frame), self.take_pose)
+        await self.show_kept()
+
+    async def show_kept(self) -> None:
+        """Show the pose that was made here last, or the one that the trial has."""
+        self.found = drafted_start(self.session)
+        pose, stored = drafted_pose(self.model, self.found), read_pose(self.session, self.model)
+        self.use.set_visibility(pose is not None)
+        if self.found is not None and pose is not None:
+            await self.draw(self.found["frame"], pose)
+            self.controls.says = self.controls.says or KEPT
+            self.controls.tell(self.found)
+        elif stored is not None:
             await self.draw(*stored)
-            self.controls.note.set_text("The outline is the pose that the trial has.")
+            self.controls.note.set_text(STORED)
+        else:
+            self.at = -1
+            self.hand.place(None)
+            self.turn_to(self.frame)
 
     async def reread(self) -> None:
-        """Say whether the trial has what is in view."""
-        self.controls.say()
+        """Show what is kept now, and say whether the trial has it: undo or another window may have changed it."""
+        if drafted_start(self.session) != self.found:
+            self.controls.says = ""
+            self.controls.tell(None)
+            await self.show_kept()
+        elif self.found is not None:
+            self.controls.say()
 
     def turn_to(self, frame: int) -> None:
         """Show the outline in its own frame only."""
@@ -69,16 +97,19 @@ class FindPanel:
     async def begin_by_hand(self) -> None:
         """Show the body upright where the cameras look, to be dragged."""
         await self.draw(self.frame, standing_pose(self.model, self.rig))
+        self.take_pose(what="body placed by hand")
 
     async def drag(self, drag: Drag) -> None:
         """Let the body follow the pointer."""
         if await self.hand.follow(self.view, drag) and drag.has_ended:
             self.take_pose()
 
-    def take_pose(self, says: str = "The pose was set by hand.") -> None:
-        """Show the pose that the hand holds, ready to be used."""
+    def take_pose(self, says: str = SET_BY_HAND, what: str = "pose set by hand") -> None:
+        """Keep the pose that the hand holds, and show it, ready to be used."""
         if self.hand.pose is not None:
             self.found = start_from_pose(self.model, self.at, self.hand.pose)
+            with errors_shown():
+                keep_start(self.session, self.found, what)
             self.use.set_visibility(True)
             self.turn_to(self.frame)
             self.controls.says = says
@@ -87,6 +118,8 @@ class FindPanel:
     async def show_found(self, each: dict[str, Any]) -> None:
         """Show a pose that was found, ready to be used."""
         self.found = {key: each[key] for key in _START if key in each}
+        with errors_shown():
+            keep_start(self.session, self.found, "pose found")
         self.use.set_visibility(True)
         await self.draw(int(each["frame"]), pose_of(self.model, each))
         self.controls.tell(self.found)

@@ -14,6 +14,7 @@ from airborne.studio.pages.find_players import FindPlayersPanel
 from airborne.studio.pages.find_pose import FindPanel
 from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.session import Session
+from airborne.studio.starts import drafted_start
 
 _HELP = "Choose the frame where tracking shall start, and place the body there. Each later frame follows from it."
 _CLICK, _FIND = "Click the points", "Let it be found"
@@ -29,7 +30,8 @@ async def first_pose_page(session: Session) -> None:
         rig = await work("calibrating the cameras", session.rig)
         if shown is None or rig is None:
             return
-        frame = int(project.table("start").get("frame", session.frame))
+        start = drafted_start(session) or project.table("start")
+        frame = int(start.get("frame", session.frame))
         if project.table("body").get("preset") == "legs":
             players = PlayersPanel(session, shown, rig, frame)
             await _build_either(players, FindPlayersPanel(session, shown, rig, frame), changed)

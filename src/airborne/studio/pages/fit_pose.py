@@ -19,9 +19,9 @@ class FitButton:
     """One window's button to fit the pose that a hand holds."""
 
     def __init__(
-        self, session: Session, hand: PoseHand, frame_of: Callable[[], int], on_fit: Callable[[str], None]
+        self, session: Session, hand: PoseHand, frame_of: Callable[[], int], on_fit: Callable[[str, str], None]
     ) -> None:
-        """Lay it out; `on_fit` is called, with what there is to say, when the hand holds the fitted pose."""
+        """Lay it out; `on_fit` gets what there is to say, and what was done, when the hand holds the fitted pose."""
         self.session, self.hand, self._frame_of, self._on_fit = session, hand, frame_of, on_fit
         ui.button("Fit it to the pictures", on_click=self.fit).props("flat dense")
 
@@ -35,4 +35,4 @@ class FitButton:
         if after is not None and hand.pose is before:
             hand.place(after)
             hand.before = outline_items(hand.model.with_pose(before), hand.cameras, BESIDE_COLOUR)
-            self._on_fit(FITTED)
+            self._on_fit(FITTED, "pose fitted to the pictures")

@@ -63,6 +63,8 @@ async def page_frame(
             await look()
 
     async def look() -> None:
+        with errors_shown():
+            session.editor.settle()
         for button, tip, what in ((undo, undo_tip, session.editor.last), (redo, redo_tip, session.editor.next)):
             button.set_enabled(what is not None)
             tip.set_text(what or "nothing")

@@ -22,9 +22,11 @@ _KEYS = {"camera", "first", "last"}
 class MaskPanel:
     """One window's row of what is left out."""
 
-    def __init__(self, session: Session, shown: ShownTrial, on_change: Callable[[str], None]) -> None:
-        """Lay it out; `on_change` is called with what was written."""
-        self.session, self.shown, self._on_change = session, shown, on_change
+    def __init__(
+        self, session: Session, shown: ShownTrial, frame_of: Callable[[], int], on_change: Callable[[str], None]
+    ) -> None:
+        """Lay it out; `frame_of` says which frame is in view, `on_change` is called with what was written."""
+        self.session, self.shown, self._frame_of, self._on_change = session, shown, frame_of, on_change
         with ui.element("div").classes("row-line") as self.area:
             self.camera = ui.select(shown.names, label="camera", value=shown.names[0])
             self.camera.props("outlined dense options-dense").style("min-width: 150px")
@@ -56,9 +58,8 @@ class MaskPanel:
 
     def add(self) -> None:
         """Leave the chosen camera out; without frames, of the one in view."""
-        first, last = (
-            self.session.frame if number.value is None else int(number.value) for number in (self.first, self.last)
-        )
+        numbers = (self.first.value, self.last.value)
+        first, last = (self._frame_of() if number is None else int(number) for number in numbers)
         camera = str(self.camera.value)
         with errors_shown():
             if last < first:

@@ -17,6 +17,9 @@ from airborne.studio.starts import POSE_COLOUR
 from airborne.studio.view import CameraViews, Drag, Mark
 
 DRAG_HELP = "Drag a limb, or the whole by its trunk; with Shift it turns. A drag in a second picture sets the distance."
+SET_BY_HAND = "The pose was set by hand."
+KEPT = "The outline is the pose that was made here last."
+STORED = "The outline is the pose that the trial has."
 _FINE_PX = 1000  # wide: while larger pictures are dragged over, the outline has half their resolution
 
 
@@ -42,6 +45,11 @@ class PoseHand:
     def place(self, pose: Pose | None) -> None:
         """Begin with a pose."""
         self.pose, self._pins, self._number, self.before = pose, {}, -1, []
+
+    async def place_next(self, pose: Pose | None) -> None:
+        """Begin with a pose once the movement on its way has been made: that is of the pose before."""
+        async with self._one_at_a_time:
+            self.place(pose)
 
     def items(self) -> list[dict[str, Any]]:
         """Return the pose's outline, where it can be grabbed."""

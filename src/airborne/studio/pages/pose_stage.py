@@ -25,9 +25,9 @@ _AWAY = 1.2  # how far off the body is looked at from, of the same
 class PoseStage:
     """One window's scene of the pose that a hand holds; it is drawn when it is first asked for."""
 
-    def __init__(self, rig: Rig, hand: PoseHand, on_move: Callable[[], None]) -> None:
-        """Lay out the button that opens it; `on_move` is called when it has moved the hand's pose."""
-        self.rig, self.hand, self._on_move = rig, hand, on_move
+    def __init__(self, rig: Rig, hand: PoseHand, on_move: Callable[[], None], on_end: Callable[[], None]) -> None:
+        """Lay out the button that opens it; `on_move` is called while it moves the hand's pose, `on_end` after that."""
+        self.rig, self.hand, self._on_move, self._on_end = rig, hand, on_move, on_end
         self._body: BodyOnStage | None = None
         self._is_held = False  # by a handle, which is where the pointer has it
         self.opener = ui.button("Move and turn it in 3D", on_click=self.open).props("flat dense")
@@ -65,4 +65,4 @@ class PoseStage:
             return
         self._is_held = not has_ended
         self.hand.place(replace(self.hand.pose, world_from_root=world_from_root))
-        self._on_move()
+        (self._on_end if has_ended else self._on_move)()

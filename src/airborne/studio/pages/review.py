@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from inspect import isawaitable
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -40,8 +42,13 @@ async def review_page(session: Session) -> None:
             return
         names = [each.name for each in runs]
         nexts: dict[Status, ui.button] = {}
+        view: CameraViews | None = None
+
+        def frame() -> int:
+            return session.frame if view is None else view.frame
 
         async def change() -> None:
+            nonlocal view
             others = [name for name in names if name != choice.value]
             if beside.value not in ("", *others):
                 beside.set_options(["", *others], value="")  # which calls this again
@@ -52,7 +59,8 @@ async def review_page(session: Session) -> None:
                 button.set_enabled(status.value in there)
             content.clear()
             with content:
-                correction = await _show_run(session, shown, session.folder / choice.value, beside.value)
+                folder = session.folder / choice.value
+                view, correction = await _show_run(session, shown, folder, beside.value, frame())
             changed[:] = [] if correction is None else [correction.reread]
 
         with ui.element("div").classes("row-line"):
@@ -67,16 +75,15 @@ async def review_page(session: Session) -> None:
         content = ui.element("div").classes("split").style("flex-direction: column")
         with jumps:
             for status in (Status.UNCERTAIN, Status.LOST):
-                go = ui.button(f"next {status.value}", on_click=lambda _, to=status: _jump(session, choice.value, to))
-                nexts[status] = go.props("flat")
-            blame = ui.button("which camera disagrees?", on_click=lambda: _blame(session, shown, choice.value, says))
-            blame.props("flat")
+                go = ui.button(f"next {status.value}").props("flat")
+                nexts[status] = go.on_click(lambda _, to=status: _jump(session.folder / choice.value, frame(), to))
+            blame = ui.button("which camera disagrees?").props("flat")
+            blame.on_click(lambda: _blame(session, shown, session.folder / choice.value, frame(), says))
         await change()
 
 
-async def _blame(session: Session, shown: ShownTrial, name: str, says: ui.label) -> None:
+async def _blame(session: Session, shown: ShownTrial, folder: Path, frame: int, says: ui.label) -> None:
     """Say which camera disagrees with the run about the frame in view."""
-    folder, frame = session.folder / name, session.frame
     if holds_players(folder):
         complain("players have no outline to compare; this is for a run of one body")
         return
@@ -87,9 +94,11 @@ async def _blame(session: Session, shown: ShownTrial, name: str, says: ui.label)
         says.set_text(f"Frame {frame}: {text}.")
 
 
-async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: str) -> Correction | None:
-    """Lay a run out; return what corrects it."""
-    bodies: list[Callable[[int], None]] = []
+async def _show_run(
+    session: Session, shown: ShownTrial, folder: Path, beside: str, frame: int
+) -> tuple[CameraViews, Correction | None]:
+    """Lay a run out, at a frame; return its pictures, and what corrects it."""
+    bodies: list[Callable[[int], Any]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
     with errors_shown():
         summary = await in_thread(read_summary, folder) if (folder / SUMMARY).is_file() else {}
@@ -106,11 +115,12 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
         kind.props("outlined dense options-dense").style("min-width: 180px")
         kind.set_visibility(len(kinds) > 1)
 
-    def turn_to(frame: int) -> None:
+    async def turn_to(frame: int) -> None:
         session.go(frame=frame)
         with errors_shown():
             for show in bodies:
-                show(frame)
+                if isawaitable(result := show(frame)):
+                    await result
 
     query = f"?beside={quote(beside)}" if beside else ""
     if beside:
@@ -122,7 +132,7 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
         with ui.element("div").classes("wide"):
             view = CameraViews(
                 shown,
-                frame=session.frame,
+                frame=frame,
                 overlay=f"/overlay/{quote(folder.name)}/{{frame}}{query}",
                 on_frame=turn_to,
                 on_move=None if correction is None else correction.move,
@@ -132,12 +142,12 @@ async def _show_run(session: Session, shown: ShownTrial, folder: Path, beside: s
             correction.view = view
             with ui.element("div").classes("side"):
                 correction.build_watch()
-                bodies += await _stage(folder, session)
-    curves = Curves(address, frame=session.frame)
-    return correction
+                bodies += await _stage(folder, view)
+    curves = Curves(address, frame=frame)
+    return view, correction
 
 
-async def _stage(folder: Path, session: Session) -> list[Callable[[int], None]]:
+async def _stage(folder: Path, view: CameraViews) -> list[Callable[[int], None]]:
     """Build the scene of a run of one body; return what shows a frame in it."""
     rows = await in_thread(run_rows, folder)
     model = await in_thread(run_body, folder)
@@ -149,15 +159,15 @@ async def _stage(folder: Path, session: Session) -> list[Callable[[int], None]]:
     def show(frame: int) -> None:
         body.show(run_rows(folder).pose(frame))
 
-    return [show, MomentumArrow(folder, session, scene).show]
+    return [show, MomentumArrow(folder, view, scene).show]
 
 
 class MomentumArrow:
     """The angular momentum at the frame in view: an arrow at the centre of mass, and its size in words."""
 
-    def __init__(self, folder: Path, session: Session, scene: Scene) -> None:
+    def __init__(self, folder: Path, view: CameraViews, scene: Scene) -> None:
         """Read the run's table once the page is there; a long one takes its time."""
-        self._folder, self._session = folder, session
+        self._folder, self._view = folder, view
         self._momenta: Momenta | None = None
         self._arrow, self._says = Arrow(scene, _MOMENTUM_COLOUR), ui.label().classes("small soft")
         ui.timer(0, self._read, once=True)
@@ -165,7 +175,7 @@ class MomentumArrow:
     async def _read(self) -> None:
         with errors_shown():
             self._momenta = await in_thread(run_momenta, self._folder)
-            self.show(self._session.frame)
+            self.show(self._view.frame)
 
     def show(self, frame: int) -> None:
         """Show a frame's."""
@@ -182,13 +192,13 @@ def _statuses(folder: Path) -> set[str]:
     return set() if holds_players(folder) else {str(status) for status in np.unique(run_rows(folder).status)}
 
 
-def _jump(session: Session, name: str, status: Status) -> None:
+def _jump(folder: Path, frame: int, status: Status) -> None:
     """Show the next frame of a status after the one in view, or the first."""
-    rows = run_rows(session.folder / name)
+    rows = run_rows(folder)
     frames = rows.index[rows.status == status.value]
     if not len(frames):  # it was tracked again since
         return
-    later = frames[frames > session.frame]
+    later = frames[frames > frame]
     ui.run_javascript(
         'window.dispatchEvent(new CustomEvent("airborne-frame", '
         f"{{detail: {{frame: {int(later[0] if len(later) else frames[0])}, from: null}}}}))"

@@ -22,18 +22,21 @@ _HELP = (
     "Step each camera to the same event, a foot that lands or a ball that is hit, and press E. "
     "Several events narrow the offset down: each says it to within half a picture."
 )
+_DRAFT = "events"  # their name among the drafts: the two videos -> pairs of pictures
 _WAYS = {"motion": "what moves", "flash": "a flash", "sound": "sound", "tracking": "tracking the body"}
 
 
 async def sync_page(session: Session) -> None:
     """Let the user find the offset of each camera from the first one's clock."""
-    async with page_frame(session, "Videos", "When is each camera?", _HELP):
+    async with page_frame(session, "Videos", "When is each camera?", _HELP) as changed:
         if len(session.project().cameras) < 2:
             ui.label("Choose two cameras or more first, in the step Videos.").classes("warn")
             return
         shown = await work("indexing the videos", session.shown)
         if shown is not None:
-            _Panel(session, shown).build()
+            panel = _Panel(session, shown)
+            panel.build()
+            changed.append(panel.reread)
 
 
 class _Panel:
@@ -72,7 +75,8 @@ class _Panel:
 
     def choose(self, other: int) -> None:
         """Show another camera beside the clock."""
-        self.other, self.events, self.at = other, [], [self.at[0], 0]
+        self.other, self.at = other, [self.at[0], 0]
+        self.events = self._kept()
         self.right.clear()
         with self.right:
             self.labels = [self.labels[0], ui.label().classes("small name")]
@@ -91,13 +95,41 @@ class _Panel:
 
     def add(self) -> None:
         """Say that both pictures show the same event."""
-        self.events.append((self.at[0], self.at[1]))
-        self.show()
+        self._keep([*self.events, (self.at[0], self.at[1])], "event added")
 
     def take_back(self) -> None:
         """Forget the last event."""
-        self.events = self.events[:-1]
+        self._keep(self.events[:-1], "event taken back")
+
+    async def reread(self) -> None:
+        """Show the events that are kept now: undo or another window may have changed them."""
+        self.events = self._kept()
         self.show()
+
+    def _keep(self, events: list[tuple[int, int]], what: str) -> None:
+        with errors_shown():
+            known = self.session.draft(_DRAFT)
+            known = known if isinstance(known, dict) else {}
+            self.session.keep_draft(_DRAFT, {**known, self._both: events}, f"{what}, {self.shown.names[self.other]}")
+            self.events = events
+        self.show()
+
+    def _kept(self) -> list[tuple[int, int]]:
+        """Return the events of the clock and the other camera that were kept last, where their videos have them."""
+        draft = self.session.draft(_DRAFT)
+        events = draft.get(self._both) if isinstance(draft, dict) else None
+        counts = [len(self.shown.indexes[k]) for k in (0, self.other)]
+        try:
+            pairs = [(int(a), int(b)) for a, b in events or ()]
+        except (TypeError, ValueError):
+            return []
+        return [pair for pair in pairs if all(0 <= at < n for at, n in zip(pair, counts, strict=True))]
+
+    @property
+    def _both(self) -> str:
+        """The two videos, and how their pictures are counted."""
+        cameras = [self.session.project().cameras[k] for k in (0, self.other)]
+        return ", ".join(f"{camera.video} {camera.fields}" for camera in cameras)
 
     def write(self) -> None:
         """Write the offset into the camera's table."""
@@ -136,7 +168,7 @@ class _Panel:
                 self.labels[side].set_text(text)
         self.use.set_visibility(bool(self.events))
         if not self.events:
-            present = self.shown.sources[self.other].offset_s
+            present = self.session.project().cameras[self.other].offset_s
             self.says.set_text(f"The trial has {1e3 * present:+.1f} ms for {self.shown.names[self.other]}.")
             return
         offset_s, sd_s = self.offset()
@@ -145,7 +177,8 @@ class _Panel:
 
     def start(self, way: str) -> None:
         """Start `airborne sync`."""
-        self.watch.start("sync", self.session.path.name, "--by", way)
+        trial = self.session.path.name
+        self.watch.start("sync", trial, "--by", way, writes=trial, what="offsets found")
 
     def tell(self, command: Command) -> None:
         """Show what it has found."""

@@ -14,37 +14,42 @@ from airborne.studio.pages.layout import complain, errors_shown, in_thread, name
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import is_inside
 from airborne.studio.session import Session
-from airborne.studio.things import MESHES, Solid, colour_at, read_thing, thing_text
+from airborne.studio.things import MESHES, Solid, colour_at, parse_thing, thing_text
 from airborne.studio.view import CameraViews
+from airborne.studio.writing import read_if_there
 
 _FILE = "thing.toml"
 _HELP = (
     "Measure the thing with a ruler: a millimetre wrong here is one in the result. Choose a solid and click it in a "
     "picture, in even light: that is its colour. Without one it is taken at the first pose."
 )
+_DRAFT = "thing"  # its name among the drafts
+_SOON = "debounce=300"  # [ms] after the last key: a number is one change, not one for each digit
+_WORDS = {"size_mm": "lengths", "centre_mm": "centre", "turn_deg": "turn", "scale": "unit"}  # of an undo
 _FIELDS = {"size_mm": "lengths [mm]", "centre_mm": "centre [mm]", "turn_deg": "turned about [°]"}
 
 
 async def thing_page(session: Session) -> None:
     """Let the user describe a thing."""
-    async with page_frame(session, "Body", "What is it made of?", _HELP):
+    async with page_frame(session, "Body", "What is it made of?", _HELP) as changed:
         if name_missing_steps(session, "camera"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is not None:
-            ThingPanel(session, shown).build()
+            panel = ThingPanel(session, shown)
+            panel.build()
+            changed.append(panel.reread)
 
 
 class ThingPanel:
-    """One window's thing; it is in its file once it is used."""
+    """One window's thing: a draft with every change, in its file once it is used."""
 
     def __init__(self, session: Session, shown: ShownTrial) -> None:
-        """Begin with the thing of the folder, or with a box."""
+        """Begin with the thing as it was described last, or with a box."""
         self.session, self.shown = session, shown
         self.name, self.solids, self.chosen = "thing", [Solid("box")], 0
-        if (session.folder / _FILE).is_file():
-            with errors_shown():
-                self.name, self.solids = read_thing(session.folder / _FILE)
+        self.text = self._kept()
+        self._read()
         inside = (path for path in sorted(session.folder.iterdir()) if is_inside(session.folder, path))
         self.shapes = ["box", "ellipsoid", *(path.name for path in inside if path.suffix.lower() in MESHES)]
 
@@ -52,12 +57,13 @@ class ThingPanel:
         """Lay out the pictures and the solids."""
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
-                view = CameraViews(
+                self.view = CameraViews(
                     self.shown, frame=self.session.frame, on_frame=self.turn_to, on_pick=self.take_colour
                 )
-                view.start_picking()
+                self.view.start_picking()
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
-                ui.input("what it is").bind_value(self, "name").props("outlined dense")
+                name = ui.input("what it is", on_change=lambda: self.keep("thing named")).bind_value(self, "name")
+                name.props(f"outlined dense {_SOON}")
                 self.form = ui.refreshable(self._form)
                 self.form()
                 ui.button("Use this thing", on_click=self.write).props("unelevated")
@@ -68,7 +74,7 @@ class ThingPanel:
 
     async def take_colour(self, pane: int, u: float, v: float, near: str | None) -> None:
         """Give the chosen solid the colour that a picture has there."""
-        number = int(self.shown.clock.images[self.session.frame, pane])
+        number = int(self.shown.clock.images[self.view.frame, pane])
         with errors_shown():
             image = await in_thread(self.session.pictures.image, self.shown.sources[pane], number)
             if image is not None:
@@ -78,6 +84,38 @@ class ThingPanel:
     def change(self, **values: object) -> None:
         """Change the chosen solid."""
         self.solids[self.chosen] = replace(self.solids[self.chosen], **values)
+        self.keep(f"{', '.join(_WORDS.get(key, key) for key in values)} of {self.solids[self.chosen].name} changed")
+
+    def keep(self, what: str) -> None:
+        """Keep the thing as it is described now."""
+        text = thing_text(self.name or "thing", self.solids)
+        if text != self.text:
+            self.text = text
+            with errors_shown():
+                over = read_if_there(self.session.folder / _FILE)
+                self.session.keep_draft(_DRAFT, {"text": text, "over": over}, what)
+
+    async def reread(self) -> None:
+        """Show what is kept now: undo or another window may have changed it."""
+        if (text := self._kept()) != self.text:
+            self.text = text
+            self._read()
+            self.chosen = min(self.chosen, len(self.solids) - 1)
+            self.form.refresh()
+
+    def _kept(self) -> str:
+        """Return the draft, unless the thing's file was changed elsewhere since; without both, a box."""
+        draft, text = self.session.draft(_DRAFT), None
+        with errors_shown():
+            text = read_if_there(self.session.folder / _FILE)
+        if isinstance(draft, dict) and isinstance(draft.get("text"), str) and draft.get("over") == text:
+            return draft["text"]
+        return thing_text("thing", [Solid("box")]) if text is None else text
+
+    def _read(self) -> None:
+        """Describe what the text holds; one that is more than solids in one piece is left alone."""
+        with errors_shown():
+            self.name, self.solids = parse_thing(self.text, _FILE)
 
     def write(self) -> None:
         """Write the thing into its file, and the file into the trial."""
@@ -103,20 +141,20 @@ class ThingPanel:
             ui.button("Remove", on_click=self._remove).props("flat dense")
         with ui.element("div").classes("row-line"):
             name = ui.input("its name", value=solid.name, on_change=lambda e: self.change(name=e.value or ""))
-            name.props("outlined dense").style("width: 110px")
+            name.props(f"outlined dense {_SOON}").style("width: 110px")
             shape = ui.select(self.shapes, label="shape", value=solid.shape, on_change=lambda e: self._shape(e.value))
             shape.props("outlined dense options-dense").style("width: 130px")
         is_mesh = solid.shape not in ("box", "ellipsoid")
         if is_mesh:
             unit = ui.number("its unit [m]", value=solid.scale, min=1e-6, on_change=lambda e: self._number("scale", e))
-            unit.props("outlined dense").style("width: 110px")
+            unit.props(f"outlined dense {_SOON}").style("width: 110px")
         for key in _FIELDS if not is_mesh else ("centre_mm", "turn_deg"):
             ui.label(_FIELDS[key]).classes("small soft")
             with ui.element("div").classes("row-line"):
                 for k, axis in enumerate("xyz"):
                     value = getattr(solid, key)[k]
                     number = ui.number(axis, value=value, on_change=lambda e, key=key, k=k: self._number(key, e, k))
-                    number.props(f'outlined dense aria-label="{_FIELDS[key]} {axis}"').style("width: 84px")
+                    number.props(f'outlined dense {_SOON} aria-label="{_FIELDS[key]} {axis}"').style("width: 84px")
         with ui.element("div").classes("row-line"):
             if solid.colour is not None:
                 shade = f"rgb({', '.join(map(str, solid.colour))})"
@@ -140,6 +178,7 @@ class ThingPanel:
 
     def _add(self) -> None:
         self.solids.append(replace(self.solids[self.chosen], name=f"solid{len(self.solids) + 1}"))
+        self.keep("solid added")
         self._choose(len(self.solids) - 1)
 
     def _remove(self) -> None:
@@ -147,4 +186,5 @@ class ThingPanel:
             complain(AirborneError("a thing has at least one solid; change this one"))
             return
         del self.solids[self.chosen]
+        self.keep("solid removed")
         self._choose(0)

@@ -135,7 +135,7 @@ class _Panel:
         self._show_buttons()
 
     async def look(self, *, anew: bool = False) -> None:
-        """Show how far the run is, and its newest frame."""
+        """Show how far the run is, and its newest frame unless the user looks at another."""
         if anew:
             self.view.set_overlay(self._overlay)
             self._show_buttons()
@@ -147,12 +147,12 @@ class _Panel:
             self.ended = command
             self._say_end(command)
         if n_done != self.n_done:
-            self.n_done = n_done
+            is_first, self.n_done = self.n_done < 0, n_done
             self.bar.value = n_done / max(self.n_frames, 1)
             self.view.run_method("refresh")
             self._show_curves()
             if newest is not None and self._is_running:
-                self.view.go(newest)
+                self.view.lead(newest, anew=is_first)
             self._show_buttons()
 
     def _show_curves(self) -> None:
@@ -162,7 +162,7 @@ class _Panel:
             self.curves.show(self._curves)
         elif self.n_done > 0:
             with self.area:
-                self.curves = Curves(self._curves, frame=self.session.frame).style("height: 220px")
+                self.curves = Curves(self._curves, frame=self.view.frame).style("height: 220px")
 
     def _say_progress(self, command: Command, n_done: int) -> None:
         left = ""

@@ -21,6 +21,7 @@ _FIELDS = {
     "progressive": "whole pictures",
     "top-first": "two fields, top first",
     "bottom-first": "two fields, bottom first",
+    "auto": "as the file's flags say",
 }
 
 
@@ -81,8 +82,7 @@ def _choose(project: Project, path: Path, facts: VideoFacts | str) -> _Choice:
     """Return what the trial says of a file; of one that it does not name, what the file's flags say."""
     camera = next((each for each in project.cameras if each.video == path.name), None)
     if camera is not None:
-        fields = camera.fields if camera.fields in _FIELDS else "progressive"
-        return _Choice(path.name, True, camera.name, fields)
+        return _Choice(path.name, True, camera.name, camera.fields)
     if isinstance(facts, str):
         return _Choice(path.name, False, path.stem, "progressive")
     return _Choice(path.name, not project.cameras, path.stem, facts.flagged_order)
@@ -104,13 +104,13 @@ def _card(choice: _Choice, facts: VideoFacts | str) -> None:
         if facts.flagged_order != "progressive":
             ui.label(f"the file's flags say {_FIELDS[facts.flagged_order]}").classes("soft small")
         orders = ui.refreshable(_show_orders)
-        orders(choice)
+        orders(choice, facts)
         fields.on_value_change(lambda: orders.refresh())
 
 
-def _show_orders(choice: _Choice) -> None:
+def _show_orders(choice: _Choice, facts: VideoFacts) -> None:
     """Show both orders of a file that is read by fields; the right one is obvious where something moves."""
-    if choice.fields == "progressive":
+    if _order(facts, choice.fields) == "progressive":
         return
     ui.label("Two neighbouring fields by either order: the right one has the smaller teeth.").classes("soft small")
     with ui.element("div").classes("row-line"):
@@ -124,8 +124,12 @@ def _show_orders(choice: _Choice) -> None:
 
 def _describe(facts: VideoFacts, fields: str) -> str:
     length = "" if facts.duration_s is None else f", {float(facts.duration_s):.1f} s"
-    halves = "" if fields == "progressive" else f" = {2 * float(facts.frame_rate):.5g} fields/s"
+    halves = "" if _order(facts, fields) == "progressive" else f" = {2 * float(facts.frame_rate):.5g} fields/s"
     return f"{facts.size[0]}×{facts.size[1]} px, {float(facts.frame_rate):.5g} pictures/s{halves}{length}"
+
+
+def _order(facts: VideoFacts, fields: str) -> str:
+    return facts.flagged_order if fields == "auto" else fields
 
 
 def _save(session: Session, choices: list[_Choice]) -> None:
