@@ -151,7 +151,7 @@ def middle(page):
 
 
 def test_a_pose_set_by_hand_waits_in_its_frame_for_whoever_turns_away_reloads_or_undoes(folder, tmp_path):
-    folder = shutil.copytree(folder, tmp_path / "person")
+    folder = shutil.copytree(folder, tmp_path / "person", ignore=shutil.ignore_patterns(".airborne", "start_*"))
     (folder / "trial.toml").write_text(TRIAL)
     with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
         wait_for_frame(page, 0)

@@ -179,7 +179,7 @@ def test_a_run_leads_the_view_only_while_nobody_looks_at_another_frame(address):
 
 
 def test_fields_that_are_read_by_the_files_flags_stay_so_when_the_cameras_are_written(folder, tmp_path):
-    folder = shutil.copytree(folder, tmp_path / "numbers")
+    folder = shutil.copytree(folder, tmp_path / "numbers", ignore=shutil.ignore_patterns(".airborne"))
     (folder / "trial.toml").write_text(TRIAL.replace('"top-first"', '"auto"'))
     with fork_studio(folder) as address, open_page(address) as page:
         page.get_by_text("as the file's flags say").wait_for()
