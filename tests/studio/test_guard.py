@@ -28,7 +28,10 @@ def studio(tmp_path_factory):
     (folder / "results").mkdir()
     (folder / "results" / "motion.csv").write_text("nothing\n")
     (folder / "results" / "report.html").write_text("<script>alert(1)</script>")
-    (folder / "results" / "link").symlink_to(outside)
+    (folder / "results" / "tables").mkdir()
+    (folder / "results" / "tables" / "report.html").write_text("<script>alert(1)</script>")
+    shutil.copytree(folder / "results", folder / "linked")
+    (folder / "linked" / "link").symlink_to(outside)
     (folder / "escape").symlink_to(outside)
     (folder / "link.mp4").symlink_to(outside / "secret.mp4")
     with fork_studio(folder) as address:
@@ -96,7 +99,10 @@ def test_pages_ask_only_this_server_and_run_only_their_own_scripts(studio):
     assert policies[0] != policies[1], "each page has a nonce of its own"
     status, headers, body = ask(studio, "/file/results/report.html")
     assert (status, body) == (200, b"<script>alert(1)</script>")
-    assert headers["content-security-policy"].startswith("sandbox; default-src 'none'")
+    rules = headers["content-security-policy"].split("; ")
+    assert {"sandbox allow-scripts allow-downloads", "default-src 'none'", "img-src data: blob:"} <= set(rules)
+    assert not [rule for rule in rules if "'self'" in rule or "connect-src" in rule or "same-origin" in rule]
+    assert ask(studio, "/file/results/tables/report.html")[1]["content-security-policy"].startswith("sandbox; ")
 
 
 def test_nothing_outside_the_folder_is_read(studio):
@@ -107,7 +113,13 @@ def test_nothing_outside_the_folder_is_read(studio):
     ]
     crafted = [crafted[k] for k in rng.permutation(len(crafted))[:N_CRAFTED]]
     crafted += [f"/thumbnail/{quote(name)}" for name in ("link.mp4", "../secret.mp4", "/etc/passwd")]
-    crafted += ["/file/escape/secret.txt", "/file/results/link/secret.txt", "/file/.airborne/find.log", "/file/../x"]
+    crafted += [
+        "/file/escape/secret.txt",
+        "/file/linked/link/secret.txt",
+        "/file/linked/motion.csv",
+        "/file/.airborne/find.log",
+        "/file/../x",
+    ]
     for path in crafted:
         status, headers, body = ask(studio, path)
         assert SECRET.encode() not in body, path

@@ -47,11 +47,14 @@ def open_studio(path: Path, *options: str) -> Iterator[str]:
 
 
 @contextmanager
-def fork_studio(path: Path, *options: str) -> Iterator[str]:
-    """Do what `open_studio` does, in a fifth of its time: in a fork of a process that has imported everything."""
+def fork_studio(path: Path, *options: str, before: Callable[[], None] | None = None) -> Iterator[str]:
+    """Do what `open_studio` does, in a fifth of its time: in a fork of a process that has imported everything.
+
+    `before`, a function of a module, is called there first.
+    """
     (ours, out), (ours_of_errors, errors) = (_FORKS.Pipe(duplex=False) for _ in range(2))
     words = ("studio", str(path), "--no-browser", *options)
-    process = _FORKS.Process(target=_run_command, args=(words, path.parent, out, errors), name=_NAME)
+    process = _FORKS.Process(target=_run_command, args=(words, path.parent, out, errors, before), name=_NAME)
     process.start()
     out.close(), errors.close()
     with open(ours.fileno(), closefd=False) as printed, open(ours_of_errors.fileno(), closefd=False) as complained:
@@ -77,18 +80,22 @@ def _address(printed: IO[str], complained: IO[str]) -> str:
     return found.group(0)
 
 
-def _run_command(words: tuple[str, ...], folder: Path, out: Connection, errors: Connection) -> None:
+def _run_command(
+    words: tuple[str, ...], folder: Path, out: Connection, errors: Connection, before: Callable[[], None] | None
+) -> None:
     for number, pipe in enumerate((out, errors), start=1):
         os.dup2(pipe.fileno(), number)
     os.chdir(folder)
     os.environ.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI looks at it
+    if before is not None:
+        before()
     sys.argv = ["airborne", *words]
     main()
 
 
 @contextmanager
 def open_page(address: str, requests: list[str] | None = None, *, is_watched: bool = True) -> Iterator:
-    """Open an address in a real browser; skip without one. Every request is noted, none may leave this computer.
+    """Open an address in a real browser; skip without one. Requests and sockets are noted, none may leave here.
 
     Each one then takes its way through this process; where time is measured, not `is_watched`, none does.
     """
@@ -128,6 +135,13 @@ def _browser_page(is_allowed: Callable[[str], bool] | None, requests: list[str] 
             else:
                 route.abort()
 
+        def note_socket(socket):
+            if requests is not None:
+                requests.append(socket.url)
+            if is_allowed is not None and not is_allowed(socket.url):
+                errors.append(f"a socket to {socket.url}")
+
+        context.on("page", lambda each: each.on("websocket", note_socket))
         if is_allowed is not None:
             context.route(re.compile("^https?:"), note)
         context.set_default_timeout(MINUTE)

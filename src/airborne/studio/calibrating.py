@@ -14,12 +14,13 @@ from airborne.calibration.sources.boards import read_board
 from airborne.calibration.sources.court import Net, survey_points
 from airborne.cameras.formats.dltdv import read_xypts
 from airborne.cameras.formats.options import FileOptions
-from airborne.errors import AirborneError, TrialError
+from airborne.errors import TrialError
 from airborne.evaluation import DigitisedPoints
 from airborne.io.text import read_json
 from airborne.io.writing import replace_text
 from airborne.studio.digitising import list_repetitions
-from airborne.studio.project import Project, is_inside, list_videos
+from airborne.studio.folder import files_inside, is_inside, readable_files
+from airborne.studio.project import Project, list_videos
 from airborne.types import Mask
 
 SOURCES, CALIBRATED = "calibration_sources.toml", "calib_studio.toml"  # what is written, and what comes of it
@@ -29,16 +30,13 @@ NETS: dict[Net, str] = {"men": "men, 2.43 m", "women": "women, 2.24 m"}
 
 def list_boards(folder: Path) -> list[str]:
     """List the files of a folder that describe a board."""
-    files = [path for path in sorted(folder.glob("*.toml")) if is_inside(folder, path)]
-    return [path.name for path in files if _is_readable(lambda path=path: read_board(path))]
+    return list(readable_files(folder, read_board, ".toml"))
 
 
 def list_wands(folder: Path) -> list[str]:
     """List the tables of a folder that hold the tracks of markers in several cameras, or clicks of a wand's ends."""
     options, clicked = FileOptions(), [each.file for each in list_repetitions(folder)]
-    tables = [path for path in sorted(folder.glob("*.csv")) if is_inside(folder, path)]
-    tracks = [path.name for path in tables if _is_readable(lambda path=path: read_xypts(path, options))]
-    return [*tracks, *clicked]
+    return [*readable_files(folder, lambda path: read_xypts(path, options), ".csv"), *clicked]
 
 
 def wand_text(project: Project, digitised: DigitisedPoints) -> str:
@@ -55,14 +53,6 @@ def wand_text(project: Project, digitised: DigitisedPoints) -> str:
                 u, v = digitised.px[row, marker, k].tolist()
                 lines.append(f"{frame},{number},{names[k]},{u!r},{v!r}")
     return "\n".join(lines) + "\n"
-
-
-def _is_readable(read: Any) -> bool:
-    try:
-        read()
-    except (AirborneError, OSError, ValueError):
-        return False
-    return True
 
 
 def guess_video(project: Project, camera: str) -> str:
@@ -111,7 +101,8 @@ def find_picture(folder: Path, name: str) -> Path | None:
 
 def list_pictures(folder: Path) -> list[Path]:
     """List the pictures of the last calibration's report: where each camera saw points, and how far off they are."""
-    return [path for path in sorted((folder / REPORT).glob("residuals_*.png")) if is_inside(folder, path)]
+    found = files_inside(folder / REPORT, ".png") if is_inside(folder, folder / REPORT) else []
+    return [path for path in found if path.name.startswith("residuals_")]
 
 
 def read_report(folder: Path) -> str:

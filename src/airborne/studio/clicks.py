@@ -11,7 +11,7 @@ import numpy as np
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras import Rig
 from airborne.cameras.clicks import read_named_numbers
-from airborne.errors import AirborneError
+from airborne.studio.folder import readable_files
 from airborne.types import Array
 
 _STEP_M = 1e-4  # of differences
@@ -97,14 +97,7 @@ def _covariance(rig: Rig, px: Array, point: Array, sd_px: float) -> Array:
 
 def list_surveys(folder: Path) -> list[str]:
     """List the tables of a folder that hold positions of named points."""
-    found = []
-    for path in sorted(folder.glob("*.csv")):
-        try:
-            if read_clicked(path).world is not None:
-                found.append(path.name)
-        except AirborneError:  # another table
-            continue
-    return found
+    return [name for name, table in readable_files(folder, read_clicked, ".csv").items() if table.world is not None]
 
 
 def _heads(cameras: Sequence[str]) -> list[str]:

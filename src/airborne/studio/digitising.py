@@ -16,6 +16,7 @@ from airborne.errors import AirborneError, ResultError
 from airborne.evaluation import DigitisedPoints, box_ends, read_clicked_frames
 from airborne.motion.rows import MotionRows
 from airborne.studio.clicks import Clicked
+from airborne.studio.folder import files_inside
 from airborne.types import Array
 
 _FILE = re.compile(r"digitised_([A-Za-z0-9-]{1,20})_([1-9]\d?)\.csv")
@@ -50,7 +51,7 @@ def parse_repetition(operator: str, number: float | None) -> Repetition:
 
 def list_repetitions(folder: Path) -> list[Repetition]:
     """List whose clicks lie in a folder."""
-    found = [_FILE.fullmatch(path.name) for path in sorted(folder.glob("digitised_*.csv"))]
+    found = [_FILE.fullmatch(path.name) for path in files_inside(folder, ".csv")]
     return [Repetition(match[1], int(match[2])) for match in found if match is not None]
 
 

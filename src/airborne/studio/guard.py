@@ -14,8 +14,13 @@ _POLICY = (
     "img-src 'self' data: blob:; font-src 'self' data:; object-src 'none'; base-uri 'none'; form-action 'self'; "
     "frame-ancestors 'none'"
 )
-# a report, a figure or a table from a run: shown, never executed, and it can ask for nothing
+# a figure, a film or a table from a run: shown, never executed, and it can ask for nothing
 FILE_POLICY = "sandbox; default-src 'none'; img-src 'self' data:; media-src 'self'; style-src 'unsafe-inline'"
+# a report shows frames by its own scripts: its origin is none, so that it has no cookie, and it can ask for nothing
+REPORT_POLICY = (
+    "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 
 
 class Guard:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,14 +14,16 @@ from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError, one_line
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
 from airborne.studio.clicks import count_clicked, read_clicked
+from airborne.studio.folder import files_inside, outer_links, path_inside, readable_files
+from airborne.studio.named_files import read_inner_tables, refuse_outer_meshes
 from airborne.studio.writing import FOLDER
 from airborne.trial.cameras import CameraTable
-from airborne.trial.file import Trial, parse_trial, read_tables
+from airborne.trial.file import Trial, parse_trial
 from airborne.video import VideoSource
 
 TRIAL = "trial.toml"
-VIDEO_ENDINGS = {".mp4", ".mov", ".avi", ".mkv", ".mts", ".m2ts", ".ts", ".mxf", ".webm", ".m4v", ".mpg", ".dv"}
-_MEASURED = (".txt", ".yml", ".yaml")
+VIDEO_ENDINGS = (".mp4", ".mov", ".avi", ".mkv", ".mts", ".m2ts", ".ts", ".mxf", ".webm", ".m4v", ".mpg", ".dv")
+BODY_ENDING, MEASURED_ENDINGS = ".toml", (".txt", ".yml", ".yaml")
 FEWEST_POINTS = 6  # that determine a camera
 StepState = Literal["empty", "ready", "needs you"]
 
@@ -54,13 +55,11 @@ class Project:
 
     def file(self, name: str) -> Path:
         """Return the path of a file that the trial names; raises TrialError for one outside the opened folder."""
-        path = self.folder / name
-        if not is_inside(self.folder, path):
-            raise TrialError(f"{name} lies outside {self.folder}; open the folder that holds both, or copy it there")
-        return path
+        return path_inside(self.folder, name)
 
     def trial(self) -> Trial:
-        """Return the trial; raises TrialError where it is unfinished."""
+        """Return the trial; raises TrialError where it is unfinished, or names a file outside the opened folder."""
+        read_inner_tables(self.folder, self.path)  # again, as links may have changed
         return parse_trial(self.path)
 
     def model(self) -> BodyModel:
@@ -75,9 +74,7 @@ def read_project(folder: Path, path: Path) -> Project:
     if not path.is_file():
         return Project(folder, path, {}, (), None)
     try:
-        tables, base = read_tables(path)
-        if base != path.parent:
-            raise TrialError(f"{path.name}: its session is in another folder; put the trial beside it")
+        tables = read_inner_tables(folder, path)
         return Project(folder, path, tables, tuple(_read_cameras(tables, path.name)), None)
     except AirborneError as error:
         return Project(folder, path, {}, (), str(error))
@@ -100,7 +97,7 @@ def find_trial(path: Path) -> tuple[Path, Path]:
     if path.is_file():
         if path.suffix.lower() in VIDEO_ENDINGS:
             raise TrialError(f"{path.name} is a video; give its folder: {path.parent}")
-        read_tables(path)
+        read_inner_tables(path.parent, path)
         return path.parent, path
     if not path.is_dir():
         raise TrialError(f"{path} is not there; give a folder of videos, or a trial's TOML file")
@@ -109,49 +106,44 @@ def find_trial(path: Path) -> tuple[Path, Path]:
 
 def list_videos(folder: Path) -> list[Path]:
     """List the video files of a folder, without links that lead out of it."""
-    return [path for path in _videos(folder) if is_inside(folder, path)]
-
-
-def list_outer_videos(folder: Path) -> list[str]:
-    """List the links to videos elsewhere, which are not read."""
-    return [path.name for path in _videos(folder) if not is_inside(folder, path)]
-
-
-def _videos(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_ENDINGS and path.is_file())
-
-
-def is_inside(folder: Path, path: Path) -> bool:
-    """Say whether a path lies in a folder once all links are followed."""
-    return path.resolve().is_relative_to(folder.resolve())
+    return files_inside(folder, *VIDEO_ENDINGS)
 
 
 def list_bodies(folder: Path) -> dict[str, BodyModel]:
     """Return the body files of a folder, by name."""
-    found = {}
-    for path in sorted(folder.glob("*.toml")):
-        try:
-            found[path.name] = read_body(path)
-        except (AirborneError, OSError):
-            continue
-    return found
+
+    def read(path: Path) -> BodyModel:
+        refuse_outer_meshes(folder, path)
+        return read_body(path)
+
+    return readable_files(folder, read, BODY_ENDING)
 
 
 def list_measurements(folder: Path) -> list[str]:
     """List the files of a folder that hold Yeadon's measurements of a person."""
-    found = []
-    for path in sorted(each for ending in _MEASURED for each in folder.glob(f"*{ending}")):
-        with suppress(AirborneError, OSError):
-            read_measurements(path)
-            found.append(path.name)
-    return found
+    return list(readable_files(folder, read_measurements, *MEASURED_ENDINGS))
 
 
 def list_runs(folder: Path) -> list[Path]:
-    """List the folders of runs, the newest first."""
-    folders = [path for path in folder.iterdir() if path.is_dir() and path.name != FOLDER and not path.is_symlink()]
-    runs = [path for path in folders if (path / MOTION).is_file() or (path / JOINTS).is_file()]
+    """List the folders of runs, the newest first, without those that hold a link which leads out of the folder."""
+    runs = [path for path in folder.iterdir() if _is_run(path) and not outer_links(folder, path)]
     return sorted(runs, key=lambda path: path.stat().st_mtime, reverse=True)
+
+
+def list_outer_runs(folder: Path) -> list[str]:
+    """List the links of runs that lead out of the folder; such a run is not read."""
+    return [link for path in sorted(folder.iterdir()) if _is_run(path) for link in outer_links(folder, path)]
+
+
+def find_run(folder: Path, name: str) -> Path | None:
+    """Return a run of the folder by its name; None where there is none."""
+    found = (path for path in folder.iterdir() if path.name == name and _is_run(path))
+    return next((path for path in found if not outer_links(folder, path)), None)
+
+
+def _is_run(path: Path) -> bool:
+    is_folder = path.is_dir() and path.name != FOLDER and not path.is_symlink()
+    return is_folder and any((path / name).is_file() for name in (MOTION, JOINTS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +194,7 @@ def _cameras_state(project: Project) -> tuple[StepState, str]:
     if "control_points" not in table:
         return ("needs you" if project.cameras else "empty"), "calibrate them"
     try:
-        clicked = read_clicked(project.folder / str(table["control_points"]))
+        clicked = read_clicked(project.file(str(table["control_points"])))
     except AirborneError as error:
         return "needs you", str(error)
     few = [each.name for each in project.cameras if count_clicked(clicked, each.name) < FEWEST_POINTS]

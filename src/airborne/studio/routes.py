@@ -17,16 +17,18 @@ from airborne import export
 from airborne.body import BodyModel
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
+from airborne.motion.run_folder import REPORT
 from airborne.studio.calibrating import find_picture
 from airborne.studio.curve_data import run_curves
 from airborne.studio.field_order import ORDERS, order_jpeg
-from airborne.studio.guard import FILE_POLICY
+from airborne.studio.guard import FILE_POLICY, REPORT_POLICY
 from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.pictures import SHRINKS
-from airborne.studio.project import list_runs, list_videos
+from airborne.studio.project import find_run, list_videos
 from airborne.studio.runs import run_body
 from airborne.studio.session import Session
 from airborne.studio.stage import part_stl
+from airborne.studio.starts import FOUND_PICTURE
 from airborne.video import VideoSource
 from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
@@ -95,7 +97,7 @@ def add_routes(app: FastAPI, session: Session) -> None:
 
     @app.get("/mesh/{run}/{part}")
     async def mesh(run: str, part: int) -> Response:
-        return await _answer(lambda: _mesh(run_body(find_run(session.folder, run)), part))
+        return await _answer(lambda: _mesh(run_body(_run(session.folder, run)), part))
 
     @app.get("/body/mesh/{part}")
     async def body_mesh(part: int) -> Response:
@@ -105,18 +107,18 @@ def add_routes(app: FastAPI, session: Session) -> None:
     async def calibration(name: str) -> Response:
         return await _answer(lambda: _calibration(session.folder, name))
 
+    @app.get("/candidates")
+    async def candidates() -> Response:
+        return await _answer(lambda: _candidates(session))
+
     @app.get("/file/{run}/{name:path}")
     async def file(run: str, name: str) -> Response:
-        return await _answer(lambda: _file(find_run(session.folder, run), name))
+        return await _answer(lambda: _file(_run(session.folder, run), name))
 
 
-def _find_run(folder: Path, name: str) -> Path | None:
-    return next((run for run in list_runs(folder) if run.name == name), None)
-
-
-def find_run(folder: Path, name: str) -> Path:
+def _run(folder: Path, name: str) -> Path:
     """Return a run of the folder by its name; raises ResultError."""
-    run = _find_run(folder, name)
+    run = find_run(folder, name)
     if run is None:
         raise ResultError(f"there is no run {name} any more; reload this page")
     return run
@@ -124,19 +126,19 @@ def find_run(folder: Path, name: str) -> Path:
 
 def _overlay(session: Session, name: str, frame: int, beside: str) -> dict[str, Any]:
     """Return what a run, and another one beside it, draw over a frame; nothing where it has not begun."""
-    run, cameras = _find_run(session.folder, name), session.shown().names
+    run, cameras = find_run(session.folder, name), session.shown().names
     if run is None:
         return {"items": [], "label": ""}
     own = run_overlay(run, frame, cameras)
     if not beside:
         return own
-    other = run_overlay(find_run(session.folder, beside), frame, cameras, colour=BESIDE_COLOUR)
+    other = run_overlay(_run(session.folder, beside), frame, cameras, colour=BESIDE_COLOUR)
     return {"items": [*other["items"], *own["items"]], "label": own["label"]}
 
 
 def _curves(folder: Path, name: str, beside: str, what: str) -> dict[str, Any]:
-    own = run_curves(find_run(folder, name), what)
-    return {**own, "beside": run_curves(find_run(folder, beside), what)} if beside else own
+    own = run_curves(_run(folder, name), what)
+    return {**own, "beside": run_curves(_run(folder, beside), what)} if beside else own
 
 
 async def _answer(make: Callable[[], Response], workers: ThreadPoolExecutor = _WORKERS) -> Response:
@@ -223,8 +225,15 @@ def _calibration(folder: Path, name: str) -> Response:
     return Response(status_code=404) if path is None else FileResponse(path, headers=_KEEP)
 
 
+def _candidates(session: Session) -> Response:
+    path = session.file(FOUND_PICTURE)
+    headers = {"cache-control": "no-store"}
+    return FileResponse(path, headers=headers) if path.is_file() else Response(status_code=404)
+
+
 def _file(run: Path, name: str) -> Response:
     path = (run / name).resolve()
     if not (path.is_relative_to(run.resolve()) and path.is_file()):
         return Response(status_code=404)
-    return FileResponse(path, headers={"content-security-policy": FILE_POLICY, "cache-control": "no-store"})
+    policy = REPORT_POLICY if name == REPORT else FILE_POLICY
+    return FileResponse(path, headers={"content-security-policy": policy, "cache-control": "no-store"})

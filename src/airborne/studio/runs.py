@@ -15,6 +15,7 @@ from airborne.errors import ResultError
 from airborne.motion import PlayersMotion
 from airborne.motion.rows import MotionRows, read_rows
 from airborne.motion.run_folder import BODY, CALIBRATION, JOINTS, MOTION, read_players_run
+from airborne.studio.folder import file_stamp
 
 _MOST_KEPT = 8  # runs
 _rows: OrderedDict[Path, tuple[Any, MotionRows]] = OrderedDict()  # run -> stamp of its file, and what was read then
@@ -25,7 +26,7 @@ def run_rows(run: Path) -> MotionRows:
     """Return the frames of a run of one body so far. Raises ResultError."""
     with _rows_lock:
         stamp, known = _rows.pop(run, (None, None))
-        now = _stamp(run / MOTION)
+        now = file_stamp(run / MOTION)
         if known is None or stamp != now:
             known = read_rows(run / MOTION, known)
         _rows[run] = now, known
@@ -45,17 +46,17 @@ def count_rows(run: Path) -> tuple[int, int | None]:
 
 def run_body(run: Path) -> BodyModel:
     """Return the body of a run."""
-    return _read_body(run / BODY, _stamp(run / BODY))
+    return _read_body(run / BODY, file_stamp(run / BODY))
 
 
 def run_rig(run: Path) -> Rig:
     """Return the cameras of a run."""
-    return _read_rig(run / CALIBRATION, _stamp(run / CALIBRATION))
+    return _read_rig(run / CALIBRATION, file_stamp(run / CALIBRATION))
 
 
 def run_players(run: Path) -> PlayersMotion:
     """Return the motion of a run of players. Raises ResultError."""
-    return _read_players(run, _stamp(run / JOINTS))
+    return _read_players(run, file_stamp(run / JOINTS))
 
 
 @lru_cache(maxsize=_MOST_KEPT)
@@ -71,10 +72,3 @@ def _read_rig(path: Path, stamp: Any) -> Rig:
 @lru_cache(maxsize=2)  # of 20 players, 100 MB each
 def _read_players(run: Path, stamp: Any) -> PlayersMotion:
     return read_players_run(run)
-
-
-def _stamp(path: Path) -> Any:
-    try:
-        return path.stat().st_mtime_ns, path.stat().st_size
-    except OSError:
-        return None

@@ -12,6 +12,7 @@ from airborne.errors import AirborneError, TrialError
 from airborne.run.opening import calibrated_cameras
 from airborne.studio.commands import Command
 from airborne.studio.drafts import DRAFTS, drafts_text, read_draft
+from airborne.studio.folder import file_stamp, path_inside
 from airborne.studio.pictures import Pictures, ShownTrial
 from airborne.studio.place import LastView, read_place, write_place
 from airborne.studio.project import Project, read_project
@@ -53,11 +54,12 @@ class Session:
     def stamp(self) -> Hashable:
         """What changes whenever a file of the folder does, or an edit may be undone that could not before."""
         tables = [path for path in self.folder.iterdir() if path.suffix in (".toml", ".csv", ".json") or path.is_dir()]
-        return tuple(map(_stamp, sorted(tables))), self.editor.last, self.editor.next
+        return tuple(map(file_stamp, sorted(tables))), self.editor.last, self.editor.next
 
     def project(self) -> Project:
         """Return the trial as its file has it now."""
-        return self._keep("project", _stamp(self.path), lambda: read_project(self.folder, self.path))
+        known = self._keep("project", file_stamp(self.path), lambda: read_project(self.folder, self.path))
+        return read_project(self.folder, self.path) if known.mistake else known  # another file may have been put right
 
     def shown(self) -> ShownTrial:
         """Return the trial's videos to look at; slow at first. Raises AirborneError where there are none."""
@@ -65,7 +67,7 @@ class Session:
         if not project.cameras:
             raise TrialError("no cameras yet; choose them in the step Videos")
         sources = tuple(map(project.source, project.cameras))
-        stamp = sources, project.cameras_stamp, tuple(_stamp(Path(source.path)) for source in sources)
+        stamp = sources, project.cameras_stamp, tuple(file_stamp(Path(source.path)) for source in sources)
         return self._keep("shown", stamp, lambda: self.pictures.show(project.cameras, project.source))
 
     def rig(self) -> Rig:
@@ -75,8 +77,12 @@ class Session:
         if not table:
             raise TrialError("the cameras are not calibrated yet; see the step Cameras")
         files = [project.file(str(table[key])) for key in ("file", "control_points") if key in table]
-        stamp = project.cameras_stamp, repr(table), tuple(map(_stamp, files))
+        stamp = project.cameras_stamp, repr(table), tuple(map(file_stamp, files))
         return self._keep("rig", stamp, lambda: calibrated_cameras(self._as_far_as_cameras(), self.shown().sizes)[0])
+
+    def file(self, name: str) -> Path:
+        """Return the path of a file of the folder; raises TrialError where it leads out of it."""
+        return path_inside(self.folder, name)
 
     def edit(self, name: str, text: str, what: str) -> None:
         """Write a file of the folder."""
@@ -84,7 +90,7 @@ class Session:
 
     def edit_trial(self, change: Callable[[str], str], what: str) -> None:
         """Change the trial's text."""
-        self.edit(self.path.name, change(read_if_there(self.path) or ""), what)
+        self.edit(self.path.name, change(read_if_there(self.file(self.path.name)) or ""), what)
 
     def set_table(self, head: str, values: dict[str, Any], what: str) -> None:
         """Set values in a table of the trial; None takes a key away."""
@@ -127,11 +133,3 @@ class Session:
         if isinstance(known[1], AirborneError):
             raise known[1]
         return known[1]
-
-
-def _stamp(path: Path) -> Hashable:
-    try:
-        status = path.stat()
-    except OSError:
-        return path.name, 0, 0
-    return path.name, status.st_mtime_ns, status.st_size

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,19 @@ from airborne.body import BodyModel, Pose
 from airborne.body.chain import angles_of
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
+from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
 from airborne.run.players_tracker import player_starts
 from airborne.studio.clicks import Clicked, read_clicked
+from airborne.studio.folder import files_inside
 from airborne.studio.session import Session
 from airborne.studio.stage import middle_of_view
-from airborne.studio.writing import read_if_there
+from airborne.studio.writing import FOLDER, read_if_there
 from airborne.tracking.first_pose import fit_to_pixels, pose_by_hand
 from airborne.tracking.players import PlayerStart
 from airborne.trial.start import StartTable
 
+FOUND = f"{FOLDER}/find"  # where the search leaves what it could not decide between
+FOUND_LIST, FOUND_PICTURE = (f"{FOUND}/{name}" for name in (CANDIDATES, CANDIDATES_PICTURE))
 POSE_COLOUR = "#f0e442"
 _BY_HAND = ("position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg")
 _WAYS = (
@@ -42,7 +47,7 @@ def points_name(frame: int) -> str:
 
 def read_points(session: Session, frame: int) -> Clicked:
     """Read the landmarks clicked in a frame; none where there is no table. Raises CalibrationError."""
-    path = session.folder / points_name(frame)
+    path = session.file(points_name(frame))
     return read_clicked(path) if path.is_file() else Clicked((), None, {})
 
 
@@ -51,9 +56,11 @@ def player_file(player: str, frame: int) -> str:
     return f"start_{player}_{frame}.csv"
 
 
-def read_player(folder: Path, player: str, frame: int) -> Clicked:
-    """Read a player's points clicked in a frame. Raises CalibrationError."""
-    return read_clicked(folder / player_file(player, frame))
+def read_players(folder: Path, frame: int) -> dict[str, Clicked]:
+    """Read the points of all players that are clicked in a frame. Raises CalibrationError."""
+    named = re.compile(player_file("(.+)", frame))
+    found = [(named.fullmatch(path.name), path) for path in files_inside(folder, ".csv")]
+    return {match[1]: read_clicked(path) for match, path in found if match is not None and match[1] != "points"}
 
 
 def read_start_players(session: Session, rig: Rig) -> tuple[int, dict[str, PlayerStart]]:

@@ -10,6 +10,7 @@ from airborne.errors import TrialError
 from airborne.io.folder_lock import refuse_links
 from airborne.io.text import read_text
 from airborne.io.writing import replace_text
+from airborne.studio.folder import is_inside
 
 KEPT = 10  # earlier versions of a file
 _LARGEST_BYTES = 50_000_000  # of a file that is edited
@@ -55,6 +56,7 @@ class Editor:
         """Write a text file of the folder; raises TrialError for a name that leads out of it."""
         self.settle()
         path = self.folder / name
+        self._refuse_link(path)
         edit = Edit(what, path, read_if_there(path), text)
         if edit.before == text:
             return
@@ -113,8 +115,7 @@ class Editor:
         return edit.says
 
     def _replace(self, path: Path, text: str | None) -> None:
-        if not path.resolve().is_relative_to(self.folder.resolve()) or path.is_symlink():
-            raise TrialError(f"{path} leads out of {self.folder}; nothing is written there: remove the link")
+        self._refuse_link(path)
         _keep(self.folder / FOLDER / "versions", path)
         for writer in self._writers:
             if writer.path == path:
@@ -123,6 +124,10 @@ class Editor:
             path.unlink(missing_ok=True)
             return
         replace_text(path, text)
+
+    def _refuse_link(self, path: Path) -> None:
+        if not is_inside(self.folder, path) or path.is_symlink():
+            raise TrialError(f"{path} leads out of {self.folder}; nothing is written there: remove the link")
 
 
 def refuse_outer_links(folder: Path) -> None:

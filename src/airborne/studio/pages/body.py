@@ -9,8 +9,9 @@ from nicegui import ui
 from airborne.body import BodyModel
 from airborne.errors import AirborneError, count
 from airborne.io.text import parse_editable_toml
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame
-from airborne.studio.project import list_bodies, list_measurements
+from airborne.studio.folder import outer_files
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_outer_links, page_frame
+from airborne.studio.project import BODY_ENDING, MEASURED_ENDINGS, list_bodies, list_measurements
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_body
 from airborne.studio.trial_edits import with_table
@@ -30,6 +31,7 @@ async def body_page(session: Session) -> None:
     async with page_frame(session, "Body", "What is tracked?", text, scrolls=True) as changed:
         table = session.project().table("body")
         bodies = await in_thread(list_bodies, session.folder)
+        name_outer_links(outer_files(session.folder, BODY_ENDING, *MEASURED_ENDINGS))
         with ui.element("div").classes("row-line").style("align-items: flex-start"):
             if bodies:
                 _thing_card(session, bodies, table)

@@ -103,7 +103,7 @@ class CalibratePanel:
                 return
             media = {camera: {"size": list(size)} for camera, size in self.shown.sizes.items()}
             if name in (each.file for each in list_repetitions(folder)):
-                clicks = read_clicked_frames(folder / name, self.shown.names)
+                clicks = read_clicked_frames(self.session.file(name), self.shown.names)
                 name = f"wand_{name}"
                 self.session.edit(name, wand_text(self.session.project(), clicks), "a wand's ends clicked")
             self._start({"wand": {"file": name, **length}}, media)
@@ -148,7 +148,7 @@ class CalibratePanel:
                     more = {"marker_mm": marker_mm, "dictionary": str(dictionary.value)}
                     text = board_text(int(columns), int(rows), square_mm, **more)
                     self.session.edit(_BOARD, text, "board described")
-                    read_board(self.session.folder / _BOARD)
+                    read_board(self.session.file(_BOARD))
                     self.board.set_options(list_boards(self.session.folder), value=_BOARD)
 
             ui.button("Describe a new board", on_click=write).props("outline")

@@ -12,6 +12,7 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError
 from airborne.studio.calibrating import NETS, court_text, read_findings
 from airborne.studio.clicks import list_surveys
+from airborne.studio.folder import files_inside
 from airborne.studio.pages.calibrate import CalibratePanel
 from airborne.studio.pages.control_points import ControlPointsPanel
 from airborne.studio.pages.layout import errors_shown, in_thread, name_missing_steps, page_frame, show_findings, work
@@ -36,7 +37,7 @@ async def cameras_page(session: Session) -> None:
         if shown is None:
             return
         wanted = {camera.calibrated_as or camera.name for camera in project.cameras}
-        files = await in_thread(_list_calibrations, session.folder, wanted)
+        files = await in_thread(list_calibrations, session.folder, wanted)
         surveys = await in_thread(list_surveys, session.folder)
         table = project.table("calibration")
         if not files and not surveys and not table:
@@ -87,12 +88,10 @@ def _chooser(session: Session, files: list[str], surveys: list[str], table: dict
     court.props("outlined dense options-dense").style("min-width: 200px")
 
 
-def _list_calibrations(folder: Path, wanted: set[str]) -> list[str]:
+def list_calibrations(folder: Path, wanted: set[str]) -> list[str]:
     """List the files of a folder that hold a calibration of these cameras."""
     found = []
-    for path in sorted(folder.iterdir()):
-        if not path.name.lower().endswith(_ENDINGS) or not path.is_file():
-            continue
+    for path in files_inside(folder, *_ENDINGS):
         try:
             rig = read_rig(path)
         except (AirborneError, OSError):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -22,7 +21,7 @@ from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import player_file, read_player, read_start_players
+from airborne.studio.starts import player_file, read_players, read_start_players
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import Mark
 from airborne.types import Array
@@ -87,10 +86,7 @@ class PlayersPanel(PointsPanel):
     async def reread(self) -> None:
         """Show the clicks that the tables hold now."""
         with errors_shown():
-            folder, named = self.session.folder, re.compile(rf"start_(.+)_{self.frame}\.csv")
-            found = [named.fullmatch(path.name) for path in sorted(folder.glob(f"start_*_{self.frame}.csv"))]
-            names = [match[1] for match in found if match is not None and match[1] != "points"]
-            self.players = {name: read_player(folder, name, self.frame) for name in names}
+            self.players = read_players(self.session.folder, self.frame)
             self.players.setdefault(self.player, Clicked((), None, {}))
             self.clicked = self.players[self.player]
             self.start_frame, self.starts = read_start_players(self.session, self.rig)

@@ -220,7 +220,7 @@ class DigitisePanel(PointsPanel):
             _tell(found)
 
     def _compare(self, run: Path) -> str:
-        path = self.session.folder / self.file
+        path = self.session.file(self.file)
         if self.model is not None and self.model.has_joints:
             paths = path.with_name(f"{path.stem}_joints.csv")
             text = joint_paths_text(self.table, self.session.rig(), run_rows(run))
@@ -230,7 +230,7 @@ class DigitisePanel(PointsPanel):
 
     async def agree(self, run: Path) -> None:
         """Say how well all people and repetitions agree with each other and with a run."""
-        own = self.session.folder / self.file
+        own = self.session.file(self.file)
         others = [self.session.folder / each.file for each in list_repetitions(self.session.folder)]
         others = [path for path in others if path != own]
         found = await work("comparing", lambda: evaluate_agreement(run, digitised=own, operators=others).describe())
@@ -276,7 +276,7 @@ class DigitisePanel(PointsPanel):
 
     def _read(self):
         points = (*default_points(self.model), *self.extra)
-        return read_digitising(self.session.folder / self.file, self.shown.names, points)
+        return read_digitising(self.session.file(self.file), self.shown.names, points)
 
     def _of_frame(self) -> Clicked:
         return clicks_of_frame(self.table, self.frame, self.shown.names)

@@ -12,13 +12,11 @@ from nicegui import ui
 
 from airborne.errors import UNDECIDED
 from airborne.io.text import read_json
-from airborne.motion.run_folder import CANDIDATES
 from airborne.run.find import describe_probability
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.session import Session
-from airborne.studio.starts import has_start
-from airborne.studio.writing import FOLDER
+from airborne.studio.starts import FOUND, FOUND_LIST, FOUND_PICTURE, has_start
 
 
 @dataclass(eq=False)
@@ -52,7 +50,7 @@ class FindControls:
 
     def search(self) -> None:
         """Start `airborne find`."""
-        self.watch.start("find", self.session.path.name, "-o", f"{FOLDER}/find", "--json")
+        self.watch.start("find", self.session.path.name, "-o", FOUND, "--json")
 
     async def take(self, command: Command) -> None:
         """Show what the search has found."""
@@ -61,7 +59,7 @@ class FindControls:
             self.candidates = ()
             says = f"Found in frame {found['frame']}, {describe_probability(found['probability'])}."
         else:
-            document = read_json(self.session.folder / FOLDER / "find" / CANDIDATES)
+            document = read_json(self.session.file(FOUND_LIST))
             self.candidates = tuple({**each, "frame": document["frame"]} for each in document["candidates"])
             found, says = self.candidates[0], "The pictures do not decide between these; choose the right one."
         if not command.is_told:  # else what was made of it since is the draft
@@ -83,6 +81,14 @@ class FindControls:
             self.note.set_text(f"{self.says} {state}")
 
     def _list_candidates(self) -> None:
-        for number, each in enumerate(self.candidates, start=1):
-            text = f"{number}: {each['probability']:.0%}"
-            ui.button(text, on_click=partial(self.show, each)).props("flat dense")
+        """Show the candidates as pictures, and a button for each."""
+        picture = self.session.folder / FOUND_PICTURE
+        if self.candidates and picture.is_file():
+            address = f"/candidates?{picture.stat().st_mtime_ns}"
+            with ui.element("a").props(f'href="{address}" target="_blank" rel="noopener"').classes("found"):
+                image = ui.element("img").props(f'src="{address}"')
+                image._props["alt"] = "the candidates, one a row, in every camera; opens larger"
+        with ui.element("div").classes("row-line"):
+            for number, each in enumerate(self.candidates, start=1):
+                text = f"candidate {number}, {100 * each['probability']:.0f} %"
+                ui.button(text, on_click=partial(self.show, each)).props("flat dense no-caps")

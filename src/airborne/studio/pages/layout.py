@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from typing import TypeVar, cast
 
@@ -163,6 +163,14 @@ def name_missing_steps(session: Session, *tables: str) -> bool:
         verb = "comes" if len(missing) == 1 else "come"
         ui.label(f"First {verb} {', '.join(missing)}: see the steps at the left.").classes("warn")
     return bool(missing)
+
+
+def name_outer_links(links: Sequence[str]) -> None:
+    """Tell which links are not followed, where there are any."""
+    if links:
+        ui.label(f"{', '.join(links)}: a link that leads out of this folder is not followed; copy the file.").classes(
+            "warn"
+        )
 
 
 def show_findings(sentences: Iterable[str]) -> None:

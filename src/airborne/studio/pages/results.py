@@ -12,9 +12,9 @@ from airborne.errors import ResultError, count
 from airborne.export.methods_text import describe_methods
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
-from airborne.studio.pages.layout import page_frame
+from airborne.studio.pages.layout import name_outer_links, page_frame
 from airborne.studio.pages.make_files import Making
-from airborne.studio.project import list_runs
+from airborne.studio.project import list_outer_runs, list_runs
 from airborne.studio.session import Session
 
 _HELP = "The report stands alone: one file, to be sent or printed. Tables open in any spreadsheet."
@@ -33,6 +33,7 @@ async def results_page(session: Session) -> None:
     """Show every run of the folder, the newest first."""
     async with page_frame(session, "Results", "What are the results?", _HELP, scrolls=True):
         runs = list_runs(session.folder)
+        name_outer_links(list_outer_runs(session.folder))
         if not runs:
             ui.label("There is no run yet; see the step Track.").classes("warn")
         for each in runs:

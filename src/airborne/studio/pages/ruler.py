@@ -73,7 +73,7 @@ class RulerPanel(PointsPanel):
     async def reread(self) -> None:
         """Show the clicks that the table holds now."""
         with errors_shown():
-            path = self.session.folder / _FILE
+            path = self.session.file(_FILE)
             self.clicked = read_clicked(path) if path.is_file() else Clicked((), None, {})
             self.show()
 

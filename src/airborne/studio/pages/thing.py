@@ -9,10 +9,10 @@ from nicegui import ui
 from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError
 from airborne.io.names import check_name
+from airborne.studio.folder import files_inside
 from airborne.studio.pages.body import save_body
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pictures import ShownTrial
-from airborne.studio.project import is_inside
 from airborne.studio.session import Session
 from airborne.studio.things import MESHES, Solid, colour_at, parse_thing, thing_text
 from airborne.studio.view import CameraViews
@@ -50,8 +50,7 @@ class ThingPanel:
         self.name, self.solids, self.chosen = "thing", [Solid("box")], 0
         self.text = self._kept()
         self._read()
-        inside = (path for path in sorted(session.folder.iterdir()) if is_inside(session.folder, path))
-        self.shapes = ["box", "ellipsoid", *(path.name for path in inside if path.suffix.lower() in MESHES)]
+        self.shapes = ["box", "ellipsoid", *(path.name for path in files_inside(session.folder, *MESHES))]
 
     def build(self) -> None:
         """Lay out the pictures and the solids."""
@@ -92,7 +91,7 @@ class ThingPanel:
         if text != self.text:
             self.text = text
             with errors_shown():
-                over = read_if_there(self.session.folder / _FILE)
+                over = read_if_there(self.session.file(_FILE))
                 self.session.keep_draft(_DRAFT, {"text": text, "over": over}, what)
 
     async def reread(self) -> None:
@@ -107,7 +106,7 @@ class ThingPanel:
         """Return the draft, unless the thing's file was changed elsewhere since; without both, a box."""
         draft, text = self.session.draft(_DRAFT), None
         with errors_shown():
-            text = read_if_there(self.session.folder / _FILE)
+            text = read_if_there(self.session.file(_FILE))
         if isinstance(draft, dict) and isinstance(draft.get("text"), str) and draft.get("over") == text:
             return draft["text"]
         return thing_text("thing", [Solid("box")]) if text is None else text
@@ -127,7 +126,7 @@ class ThingPanel:
             if len(set(names)) < len(names):
                 raise TrialError("two solids have the same name; give each its own")
             self.session.edit(_FILE, thing_text(self.name or "thing", self.solids), "thing described")
-            read_body(self.session.folder / _FILE)
+            read_body(self.session.file(_FILE))
             save_body(self.session, {"file": _FILE})
 
     def _form(self) -> None:

@@ -12,9 +12,10 @@ from airborne.errors import STOPPED, AirborneError, TrialError, count
 from airborne.io.names import check_name
 from airborne.motion.run_folder import MOTION, SUMMARY
 from airborne.studio.commands import Command
+from airborne.studio.folder import is_inside, outer_links
 from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pictures import ShownTrial
-from airborne.studio.project import is_inside, list_runs
+from airborne.studio.project import find_run, list_runs
 from airborne.studio.runs import count_rows
 from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Curves
@@ -106,6 +107,11 @@ class _Panel:
     def _is_running(self) -> bool:
         return self._command is not None and self._command.is_running
 
+    def _count(self) -> tuple[int, int | None]:
+        """Return how many frames the run holds so far, and which is the newest."""
+        run = find_run(self.session.folder, self.folder.name)
+        return (0, None) if run is None else count_rows(run)
+
     def turn_to(self, frame: int) -> None:
         """Note the frame in view."""
         self.session.go(frame=frame)
@@ -118,12 +124,14 @@ class _Panel:
             check_name(self.folder.name)
             if not is_inside(self.session.folder, self.folder):
                 raise TrialError(f"{self.folder.name} is a link that leads out of the folder; give another name")
+            if links := outer_links(self.session.folder, self.folder):
+                raise TrialError(f"{', '.join(links)} leads out of the folder; remove the link, or give another name")
             self.session.project().trial()
         except (ValueError, TrialError) as error:
             complain(str(error))
             return
         words = ["track", self.session.path.name, "-o", self.folder.name, *options]
-        self.n_before = count_rows(self.folder)[0] if "--resume" in options else 0
+        self.n_before = self._count()[0] if "--resume" in options else 0
         self.session.commands["track"] = Command(words, self.session.folder)
         self.n_done = -1
         self._show_buttons()
@@ -139,7 +147,7 @@ class _Panel:
         if anew:
             self.view.set_overlay(self._overlay)
             self._show_buttons()
-        n_done, newest = await in_thread(count_rows, self.folder)
+        n_done, newest = await in_thread(self._count)
         command = self._command
         if command is not None and command.is_running:
             self._say_progress(command, n_done)

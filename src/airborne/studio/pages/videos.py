@@ -11,8 +11,9 @@ from nicegui import ui
 from airborne.errors import AirborneError
 from airborne.io.names import check_name
 from airborne.studio.field_order import ORDERS
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame
-from airborne.studio.project import Project, list_outer_videos, list_videos
+from airborne.studio.folder import outer_files
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_outer_links, page_frame
+from airborne.studio.project import VIDEO_ENDINGS, Project, list_videos
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_cameras
 from airborne.video import VideoFacts, VideoSource, inspect
@@ -49,10 +50,7 @@ async def videos_page(session: Session) -> None:
         order = [camera.video for camera in project.cameras]  # the trial's, as its first camera is the clock
         files = list_videos(session.folder)
         files.sort(key=lambda path: order.index(path.name) if path.name in order else len(order))
-        if outer := list_outer_videos(session.folder):
-            ui.label(
-                f"{', '.join(outer)}: a link that leads out of this folder is not followed; copy the file"
-            ).classes("warn")
+        name_outer_links(outer_files(session.folder, *VIDEO_ENDINGS))
         if not files:
             ui.label(f"{session.folder} holds no videos; copy them there, then reload this page.").classes("warn")
             return
