@@ -5,17 +5,24 @@ import shutil
 from itertools import product
 from urllib.parse import quote, urlsplit
 
+import nicegui
 import numpy as np
 import pytest
+from fastapi import FastAPI
+from nicegui.dependencies import esm_modules, libraries
 
+from airborne.studio import server  # noqa: F401 its pages bring their own addresses
+from airborne.studio.calibrating import REPORT
+from airborne.studio.routes import add_routes
+from airborne.studio.starts import FOUND, FOUND_PICTURE
 from tests.support.places import THROWN_CROSS
 from tests.support.studio import fork_studio
 
 SECRET = "only its owner may read this"
-N_CRAFTED = 200
+N_CRAFTED = 12  # for each address that the studio answers
 CLIMBS = ("../", "..%2f", "%2e%2e/", "%2e%2e%2f", "..\\", "..%5c", "....//", "..;/", "%252e%252e%252f", "..%c0%af", "/")
 TARGETS = ("secret.txt", "secret.mp4", "etc/passwd", "proc/self/environ", "root/.ssh/id_rsa", "link/secret.txt")
-PLACES = ("file/results/", "file/", "thumbnail/", "overlay/", "curves/", "image/", "image/0/", "", "_nicegui/3/static/")
+GIVEN = {"run": "results", "camera": "0", "order": "top-first"}  # what stands before a path's last part
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +41,24 @@ def studio(tmp_path_factory):
     (folder / "linked" / "link").symlink_to(outside)
     (folder / "escape").symlink_to(outside)
     (folder / "link.mp4").symlink_to(outside / "secret.mp4")
+    (folder / REPORT).mkdir()
+    (outside / "secret.png").write_text(SECRET)
+    (folder / REPORT / "residuals_cam1.png").symlink_to(outside / "secret.png")
     with fork_studio(folder) as address:
+        (folder / FOUND).mkdir()  # with a link there from the beginning the studio does not open
+        (folder / FOUND_PICTURE).symlink_to(outside / "secret.png")
         yield urlsplit(address)
+
+
+def places():
+    """Return what every address of the studio begins with, up to the part that may be anything."""
+    own = FastAPI()
+    add_routes(own, None)
+    for route in (*nicegui.app.routes, *own.routes):
+        head, brace, _ = route.path.rpartition("{")
+        keys = esm_modules if "/esm/" in head else {"none": None}
+        yield head.format(**GIVEN, key=next(iter(keys))) if brace else f"{route.path}/"
+    yield "/"
 
 
 def ask(studio, path, **headers):
@@ -105,18 +128,48 @@ def test_pages_ask_only_this_server_and_run_only_their_own_scripts(studio):
     assert ask(studio, "/file/results/tables/report.html")[1]["content-security-policy"].startswith("sandbox; ")
 
 
+def test_the_crafted_addresses_begin_as_those_that_are_answered(studio):
+    known = set(places())
+    static = next(place for place in known if place.endswith("/static/"))
+    esm = next(place for place in known if "/esm/" in place)
+    modules = esm_modules[esm.split("/")[-2]].path
+    library = next(iter(libraries))
+    for begin, rest in (
+        (static, "nicegui.css"),
+        (esm, next(path.name for path in modules.iterdir() if path.suffix == ".js")),
+        (next(place for place in known if place.endswith("/libraries/")), library),
+        ("/example/", "cameras.jpg"),
+        ("/parts/", "curves.js"),
+        ("/file/results/", "motion.csv"),
+        ("/thumbnail/", "cam1.mp4"),
+        ("/fields/top-first/", "cam1.mp4"),
+        ("/body/mesh/", "0"),
+        ("/image/0/", "0"),
+        ("/picture/0/", "0"),
+    ):
+        assert begin in known and ask(studio, f"{begin}{rest}")[0] == 200, begin
+    assert {"/overlay/results/", "/curves/", "/mesh/results/", "/calibration/", "/candidates/"} <= known
+
+
 def test_nothing_outside_the_folder_is_read(studio):
     rng = np.random.default_rng(0)
+    ways = list(product(CLIMBS, TARGETS))
     crafted = [
-        f"/{place}{climb * int(rng.integers(1, 12))}{target}"
-        for place, climb, target in product(PLACES, CLIMBS, TARGETS)
+        f"{place}{ways[k][0] * int(rng.integers(1, 12))}{ways[k][1]}"
+        for place in places()
+        for k in rng.permutation(len(ways))[:N_CRAFTED]
     ]
-    crafted = [crafted[k] for k in rng.permutation(len(crafted))[:N_CRAFTED]]
+    assert len(crafted) > 200
     crafted += [f"/thumbnail/{quote(name)}" for name in ("link.mp4", "../secret.mp4", "/etc/passwd")]
     crafted += [
         "/file/escape/secret.txt",
         "/file/linked/link/secret.txt",
         "/file/linked/motion.csv",
+        "/curves/linked",
+        "/curves/results?beside=linked",
+        "/mesh/linked/0",
+        "/calibration/residuals_cam1.png",
+        "/candidates",
         "/file/.airborne/find.log",
         "/file/../x",
     ]
@@ -125,4 +178,4 @@ def test_nothing_outside_the_folder_is_read(studio):
         assert SECRET.encode() not in body, path
         assert b"root:" not in body, path
         assert "image" not in headers.get("content-type", ""), path
-        assert status in (307, 400, 404, 405, 422), (path, status)
+        assert status in (307, 400, 403, 404, 405, 422), (path, status)
