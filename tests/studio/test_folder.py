@@ -14,11 +14,11 @@ from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.errors import TrialError
 from airborne.io.names import check_path
 from airborne.studio.calibrating import REPORT, board_text, list_boards, list_pictures, list_wands
+from airborne.studio.calibrations import list_calibrations
 from airborne.studio.clicks import list_surveys
 from airborne.studio.digitising import list_repetitions
 from airborne.studio.folder import files_inside, outer_files, path_inside
 from airborne.studio.named_files import PATHS
-from airborne.studio.pages.cameras import list_calibrations
 from airborne.studio.project import (
     find_run,
     find_trial,
@@ -45,7 +45,7 @@ file = "hull.obj"
 colour = "sample"
 """
 LISTS = {
-    "calibration": lambda folder: list_calibrations(folder, {"cam1"}),
+    "calibration": lambda folder: list_calibrations(folder, {"cam1"}).usable,
     "surveys": list_surveys,
     "bodies": lambda folder: [name for name in list_bodies(folder) if name != "hull.toml"],
     "bodies with a mesh": lambda folder: [name for name in list_bodies(folder) if name == "hull.toml"],

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from nicegui import ui
 
 from airborne.calibration.sources.court import Net
-from airborne.cameras import Rig, read_rig
-from airborne.errors import AirborneError
+from airborne.cameras import Rig
+from airborne.errors import count
 from airborne.studio.calibrating import NETS, court_text, read_findings
+from airborne.studio.calibrations import ENDINGS, Calibrations, list_calibrations
 from airborne.studio.clicks import list_surveys
-from airborne.studio.folder import files_inside
+from airborne.studio.folder import outer_files
 from airborne.studio.pages.calibrate import CalibratePanel
+from airborne.studio.pages.camera_names import CameraNames, use_calibration
 from airborne.studio.pages.control_points import ControlPointsPanel
-from airborne.studio.pages.layout import errors_shown, in_thread, name_missing_steps, page_frame, show_findings, work
+from airborne.studio.pages.layout import (
+    errors_shown,
+    in_thread,
+    name_missing_steps,
+    name_outer_links,
+    page_frame,
+    show_findings,
+    work,
+)
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras
 
-_ENDINGS = (".toml", ".txt", ".xcp", ".yml", ".yaml", ".csv")
 _HELP = (
     "To use a calibration of any program, put its file beside the videos and reload this page. Or click surveyed "
     "points, or those of a court: six in each camera at least, spread over the space in which the body moves; "
@@ -38,17 +46,21 @@ async def cameras_page(session: Session) -> None:
             return
         wanted = {camera.calibrated_as or camera.name for camera in project.cameras}
         files = await in_thread(list_calibrations, session.folder, wanted)
+        name_outer_links(outer_files(session.folder, *ENDINGS))
         surveys = await in_thread(list_surveys, session.folder)
         table = project.table("calibration")
-        if not files and not surveys and not table:
+        if not (files.usable or files.renamed or surveys or table):
             ui.label(
                 "The folder holds neither a calibration of these cameras nor a table of surveyed points "
                 "(point,x_m,y_m,z_m). Put one there and reload this page; or click the points of a court, or calibrate "
                 "with a board or a wand."
             ).classes("warn")
+        names_form = CameraNames(session)
         with ui.element("div").classes("row-line"):
-            _chooser(session, files, surveys, table)
+            _chooser(session, files, surveys, names_form)
             CalibratePanel(session, shown).build()
+        names_form.build()
+        _show_refused(session, files)
         if table.get("control_points"):
             panel = await ControlPointsPanel.open(session, shown, str(table["control_points"]))
             if panel is not None:
@@ -59,14 +71,17 @@ async def cameras_page(session: Session) -> None:
                 _show_rig(rig, _findings_of(session, str(table["file"])))
 
 
-def _chooser(session: Session, files: list[str], surveys: list[str], table: dict) -> None:
+def _chooser(session: Session, files: Calibrations, surveys: list[str], names_form: CameraNames) -> None:
+    table = session.project().table("calibration")
+
     def use(key: str, name: str) -> None:
         if table.get(key) == name:
             return
-        with errors_shown():
-            other = "control_points" if key == "file" else "file"
-            session.set_table("calibration", {key: name, other: None}, f"calibration by {name}")
-            ui.navigate.reload()
+        if key == "file" and name in files.renamed:
+            names_form.show(name, files.renamed[name])
+            return
+        calibrated_as = {each.name: each.calibrated_as for each in session.project().cameras} if key == "file" else {}
+        use_calibration(session, {"file": None, "control_points": None, key: name}, calibrated_as)
 
     def use_court(net: Net) -> None:
         name = f"court_{net}.csv"
@@ -75,7 +90,8 @@ def _chooser(session: Session, files: list[str], surveys: list[str], table: dict
                 session.edit(name, court_text(net), "points of a court")
             use("control_points", name)
 
-    for key, names, label in (("file", files, "calibration file"), ("control_points", surveys, "surveyed points")):
+    both = [*files.usable, *files.renamed]
+    for key, names, label in (("file", both, "calibration file"), ("control_points", surveys, "surveyed points")):
         if names:
             present = table.get(key)
             ui.select(
@@ -88,17 +104,14 @@ def _chooser(session: Session, files: list[str], surveys: list[str], table: dict
     court.props("outlined dense options-dense").style("min-width: 200px")
 
 
-def list_calibrations(folder: Path, wanted: set[str]) -> list[str]:
-    """List the files of a folder that hold a calibration of these cameras."""
-    found = []
-    for path in files_inside(folder, *_ENDINGS):
-        try:
-            rig = read_rig(path)
-        except (AirborneError, OSError):
-            continue
-        if wanted <= set(rig.names):
-            found.append(path.name)
-    return found
+def _show_refused(session: Session, files: Calibrations) -> None:
+    """Say which files hold no calibration of these cameras, and why."""
+    refused = {name: reason for name, reason in files.refused.items() if name != session.path.name}
+    if refused:
+        title = f"{count(len(refused), 'other file')}: no calibration of these cameras"
+        with ui.expansion(title, value=not (files.usable or files.renamed)).props("dense"):
+            for name, reason in refused.items():
+                ui.label(reason if name in reason else f"{name}: {reason}").classes("soft small")
 
 
 def _findings_of(session: Session, file: str) -> dict[str, list[str]]:
