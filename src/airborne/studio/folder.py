@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
@@ -62,8 +62,8 @@ def outer_links(folder: Path, inner: Path) -> list[str]:
     return sorted(found)
 
 
-def file_stamp(path: Path) -> Hashable:
-    """Return what changes whenever a file does."""
+def file_stamp(path: Path) -> tuple[str, int, int]:
+    """Return what changes whenever a file does: its name, its time of change [ns], its size; zeros where it is not."""
     try:
         status = path.stat()
     except OSError:

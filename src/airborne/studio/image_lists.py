@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.errors import ResultError
 from airborne.io.npz import read_arrays, write_arrays
+from airborne.studio.folder import file_stamp
 from airborne.video import VideoSource, inspect
 from airborne.video.seeking import ImageIndex, index_images
 
@@ -21,7 +22,8 @@ LISTS = "images"  # in the folder of what the studio remembers
 def read_or_list(folder: Path, source: VideoSource) -> ImageIndex:
     """Return when each image of a file is shown, as the folder has it, else read off the file. Raises VideoError."""
     name = hashlib.sha256(str(Path(source.path).absolute()).encode()).hexdigest()[:16]
-    path, stamp = folder / LISTS / f"{name}.npz", _stamp(source)
+    _, *status = file_stamp(Path(source.path))
+    path, stamp = folder / LISTS / f"{name}.npz", np.array(status, np.int64)
     with suppress(OSError, ValueError, KeyError, TypeError, ZeroDivisionError):
         kept = read_arrays(path)
         if np.array_equal(kept["stamp"], stamp):
@@ -43,12 +45,3 @@ def _index(source: VideoSource, kept: dict[str, NDArray]) -> ImageIndex:
     if ticks.dtype != np.int64 or keys.dtype != np.int64 or not len(ticks) or np.any(np.diff(ticks) <= 0):
         raise ValueError("no list of images")
     return ImageIndex(inspect(source), ticks, keys, first, Fraction(numerator, denominator))
-
-
-def _stamp(source: VideoSource) -> NDArray[np.int64]:
-    """Return what changes whenever a file does."""
-    try:
-        status = Path(source.path).stat()
-    except OSError:
-        return np.zeros(0, np.int64)
-    return np.array([status.st_size, status.st_mtime_ns], np.int64)

@@ -50,6 +50,10 @@ class Session:
             self.place = place
             write_place(self.folder, place)
 
+    def turn_to(self, frame: int) -> None:
+        """Note the frame in view."""
+        self.go(frame=frame)
+
     @property
     def stamp(self) -> Hashable:
         """What changes whenever a file of the folder does, or an edit may be undone that could not before."""

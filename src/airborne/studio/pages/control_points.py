@@ -15,7 +15,7 @@ from airborne.errors import AirborneError
 from airborne.studio.clicks import Clicked, count_clicked, read_clicked
 from airborne.studio.pages.layout import complain, errors_shown, show_findings
 from airborne.studio.pages.point_list import PointList
-from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
+from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
@@ -23,7 +23,7 @@ from airborne.studio.stage import draw_cameras, draw_rays
 from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
 
-_CLICKED, _PREDICTED = "#56b4e9", "#c8cdd3"
+_CLICKED = "#56b4e9"
 _LINE_POINTS = 60  # of a court's line, which a lens bends
 
 
@@ -133,7 +133,7 @@ class ControlPointsPanel(PointsPanel):
                 marks.append({**mark, "to": to.tolist()} if np.isfinite(to).all() else mark)
             elif np.isfinite(to).all():
                 label = f"{name}?" if name == self.chosen else ""
-                marks.append({"pane": pane, "u": to[0], "v": to[1], "label": label, "colour": _PREDICTED})
+                marks.append({"pane": pane, "u": to[0], "v": to[1], "label": label, "colour": PREDICTED_COLOUR})
         return marks
 
     def _court(self, pane: int, camera: str) -> Iterator[Item]:
@@ -145,7 +145,7 @@ class ControlPointsPanel(PointsPanel):
                 own = fit.rig[camera]
                 px = own.px_from_world(ends[0] + np.linspace(0, 1, _LINE_POINTS)[:, None] * (ends[1] - ends[0]))
                 inside = np.isfinite(px).all(axis=1) & (abs(px / own.size - 0.5) < 1).all(axis=1)
-                yield {"pane": pane, "points": px[inside].round(1).tolist(), "colour": _PREDICTED, "width": 1.0}
+                yield {"pane": pane, "points": px[inside].round(1).tolist(), "colour": PREDICTED_COLOUR, "width": 1.0}
 
     def predict(self, camera: str) -> Array | None:
         """Return where a solved camera sees every point: (n, 2) [px]."""

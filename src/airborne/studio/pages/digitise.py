@@ -30,7 +30,7 @@ from airborne.studio.digitising import (
 )
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pages.point_list import PointList
-from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PointsPanel
+from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.runs import run_rows
@@ -44,7 +44,6 @@ _HELP = (
 )
 _EMPTY = "There are no points to click yet. Name one below, such as one end of the body, and press Add."
 _DRAFT = "points"  # their name among the drafts
-_PREDICTED = "#c8cdd3"
 _AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing"}
 
 
@@ -258,7 +257,7 @@ class DigitisePanel(PointsPanel):
                 u, v = map(float, predict_click(self.table, self.frame, name, pane))
                 if np.isfinite(u):
                     label = f"{name}?" if name == self.chosen else ""
-                    yield {"pane": pane, "u": u, "v": v, "label": label, "colour": _PREDICTED}
+                    yield {"pane": pane, "u": u, "v": v, "label": label, "colour": PREDICTED_COLOUR}
 
     def _off_px(self, name: str) -> tuple[Mask, Array]:
         """Say in which cameras a point is clicked; with the help, how far from where the cameras agree [px]."""

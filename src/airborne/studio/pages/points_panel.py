@@ -20,6 +20,7 @@ from airborne.types import Array, Mask
 
 CAMERA_COLOURS = ("#56b4e9", "#e69f00", "#cc79a7", "#009e73", "#0072b2", "#d55e00")  # in order
 CHOSEN_COLOUR = "#f0e442"
+PREDICTED_COLOUR = "#c8cdd3"  # where a point that is not clicked may be
 CLICK_SD_PX = 1.0  # of a careful click, right and down: the band is two of these
 
 
@@ -70,7 +71,7 @@ class PointsPanel:
 
     async def turn_to(self, frame: int) -> None:
         """Note the frame in view."""
-        self.session.go(frame=frame)
+        self.session.turn_to(frame)
 
     async def pick(self, pane: int, u: float, v: float, near: str | None) -> None:
         """Set the chosen point in a camera; where it is set already, a click close to a mark chooses that."""

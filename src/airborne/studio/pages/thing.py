@@ -57,7 +57,7 @@ class ThingPanel:
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
                 self.view = CameraViews(
-                    self.shown, frame=self.session.frame, on_frame=self.turn_to, on_pick=self.take_colour
+                    self.shown, frame=self.session.frame, on_frame=self.session.turn_to, on_pick=self.take_colour
                 )
                 self.view.start_picking()
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
@@ -66,10 +66,6 @@ class ThingPanel:
                 self.form = ui.refreshable(self._form)
                 self.form()
                 ui.button("Use this thing", on_click=self.write).props("unelevated")
-
-    def turn_to(self, frame: int) -> None:
-        """Note the frame in view."""
-        self.session.go(frame=frame)
 
     async def take_colour(self, pane: int, u: float, v: float, near: str | None) -> None:
         """Give the chosen solid the colour that a picture has there."""

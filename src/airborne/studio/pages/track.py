@@ -82,7 +82,9 @@ class _Panel:
                 .style("width: 220px")
             )
             self.says = ui.label().classes("small soft")
-        self.view = CameraViews(self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.turn_to)
+        self.view = CameraViews(
+            self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.session.turn_to
+        )
         self.area = ui.element("div").style("display: contents")
         ui.timer(_LOOK_EVERY_S, self.look)
 
@@ -111,10 +113,6 @@ class _Panel:
         """Return how many frames the run holds so far, and which is the newest."""
         run = find_run(self.session.folder, self.folder.name)
         return (0, None) if run is None else count_rows(run)
-
-    def turn_to(self, frame: int) -> None:
-        """Note the frame in view."""
-        self.session.go(frame=frame)
 
     def start(self, *options: str) -> None:
         """Start `airborne track`."""
