@@ -55,11 +55,9 @@ def readable_files(folder: Path, read: Callable[[Path], _T], *endings: str) -> d
 
 def outer_links(folder: Path, inner: Path) -> list[str]:
     """List the links anywhere in a folder that is in the opened one which lead out of that; relative to it."""
-    found = []
-    for place, folders, files in os.walk(inner):
-        links = (path for path in (Path(place, name) for name in (*folders, *files)) if path.is_symlink())
-        found += [str(path.relative_to(folder)) for path in links if not is_inside(folder, path)]
-    return sorted(found)
+    names = (os.path.join(place, name) for place, *within in os.walk(inner) for some in within for name in some)
+    links = [Path(name) for name in names if os.path.islink(name)]  # looked for at each picture of a run
+    return sorted(str(path.relative_to(folder)) for path in links if not is_inside(folder, path))
 
 
 def file_stamp(path: Path) -> tuple[str, int, int]:
