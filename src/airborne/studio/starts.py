@@ -148,7 +148,7 @@ def drafted_pose(model: BodyModel, start: dict[str, Any] | None) -> Pose | None:
 
 
 def _clicks_text(session: Session, start: dict[str, Any]) -> str | None:
-    return read_if_there(session.folder / points_name(start["frame"]))
+    return read_if_there(session.file(points_name(start["frame"])))
 
 
 def fit_clicks(model: BodyModel, rig: Rig, clicked: Clicked) -> tuple[Pose | None, str]:
