@@ -60,12 +60,12 @@ def test_players_are_clicked_and_a_length_is_measured(rig, folder):
         wait_for_frame(page, 0)
         for name, point in LEGS.items():
             click_everywhere(user, rig, name, point)
-        page.get_by_text("Ready to be used: player1.").wait_for()
+        page.get_by_text("Ready to use: player1.").wait_for()
         page.get_by_label("another player's name").fill("player3")
         user.press("Add")
         page.locator(".point.here", has_text="torso").wait_for()  # the new player's list
         click_everywhere(user, rig, "torso", LEGS["torso"] + ASIDE)
-        page.get_by_text("Ready to be used: player1, player3.").wait_for()
+        page.get_by_text("Ready to use: player1, player3.").wait_for()
         user.press("Add")  # of those without a name, the first that is none of these
         page.get_by_label("player", exact=True).and_(page.locator("[value=player2]")).wait_for()
         user.press("Use these players")

@@ -157,7 +157,7 @@ def test_a_pose_set_by_hand_waits_in_its_frame_for_whoever_turns_away_reloads_or
         wait_for_frame(page, 0)
         page.get_by_text("No landmark is clicked in frame 0 yet.").wait_for()
         page.get_by_role("button", name="Place it by hand").click()
-        page.get_by_text("Drag the body, its limbs, and with Shift its turn.", exact=True).wait_for()
+        page.get_by_text("Drag the body or its limbs; Shift turns it.", exact=True).wait_for()
         page.wait_for_function("document.querySelector('canvas.view').view.nowItems().length >= 2")
         placed = middle(page)
         drag_trunk(page, 0, (40.0, -18.0))

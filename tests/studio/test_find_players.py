@@ -35,8 +35,8 @@ def test_where_nobody_stands_the_studio_says_so_and_clicks_are_a_button_away(rig
     with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
         user = User(page)
         wait_for_frame(page, 0)
-        user.press("Let it be found")
+        user.press("Find automatically")
         user.press("Find it")
         page.get_by_text("no player is seen to stand at the net", exact=False).wait_for()
         user.press("Click the points")
-        page.get_by_text("Ready to be used: nobody clicked yet.").wait_for()
+        page.get_by_text("No player is ready to use yet.").wait_for()

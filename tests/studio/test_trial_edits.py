@@ -83,7 +83,7 @@ def test_masks_are_added_and_taken_away_beside_what_stands_there():
     text = without_mask(text, 0)
     assert parse_toml(text)["mask"] == [{"camera": "right", "first": 5, "last": 5}]
     assert parse_toml(without_mask(text, 0)) == parse_toml(TEXT)
-    with pytest.raises(TrialError, match="the trial has 1 masks"):
+    with pytest.raises(TrialError, match="the trial has 1 mask;"):
         without_mask(text, 1)
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from airborne.studio.project import Project, StudioStep, steps
 
 _TO_DO = {
-    "Videos": "Three cameras filmed a wooden cross that was thrown. Their files are ticked, and hold two fields in a "
-    "picture, which doubles the images. Press <b>Use these cameras</b>.",
+    "Videos": "Three cameras filmed a wooden cross that was thrown. Their files are ticked, and interlaced: two fields "
+    "in each picture, which doubles the images. Press <b>Use these cameras</b>.",
     "Cameras": "Points of known places hung in the scene. Choose <b>control_points.csv</b> as surveyed points: their "
     "clicks are in it, and each camera is solved at once. Drag one and watch its residual.",
     "Body": "The cross was measured. Choose <b>cross.toml</b> as body file, and press <b>Use this body</b>.",
-    "First pose": "Press <b>Find it</b>, wait, look whether the outline lies on the cross in all three "
+    "First pose": "Press <b>Find it</b>, wait, check that the outline lies on the cross in all three "
     "pictures, and press <b>Use this pose</b>.",
     "Track": "Press <b>Track</b> and watch the outline follow the cross.",
     "Review": "Step with the arrow keys through the throw: pictures, curves and the scene go together.",
-    "Digitise": "Here a person clicks points, to compare with. Nothing is needed for the report: go to Results.",
-    "Results": "Open the report. It is one file, to be sent or printed. That was the walk; now open a folder of yours.",
+    "Digitise": "Here a person clicks points, to compare a run with. The report does not need them: go to Results.",
+    "Results": "Open the report: one file, to send or to print. That was the walk; now open a folder of your own.",
 }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Table
 
-from airborne.errors import TrialError
+from airborne.errors import TrialError, count
 from airborne.io.text import parse_editable_toml
 
 
@@ -91,7 +91,7 @@ def without_mask(text: str, number: int) -> str:
     document = _parse(text)
     masks = document.get("mask", [])
     if not 0 <= number < len(masks):
-        raise TrialError(f"the trial has {len(masks)} masks; reload this page")
+        raise TrialError(f"the trial has {count(len(masks), 'mask')}; reload this page")
     del masks[number]
     if not masks:
         del document["mask"]

@@ -115,7 +115,7 @@ export default {
       pen.lineTo(left + side / 2 + 20 * dx, top + side / 2 + 20 * dy);
     }
     pen.stroke();
-    this.write(pen, `${u.toFixed(1)}, ${v.toFixed(1)}`, left + 5, top + side - 6, "#ffffff");
+    this.write(pen, `${u.toFixed(1)}, ${v.toFixed(1)} px`, left + 5, top + side - 6, "#ffffff");
     pen.restore();
   },
   write(pen, text, x, y, colour) {

@@ -47,7 +47,7 @@ async def body_page(session: Session) -> None:
         changed.append(show_anew)
         with ui.element("div").classes("row-line"):
             if session.project().cameras:
-                _link("/thing", "Describe a thing of solids")
+                _link("/thing", "Describe a thing made of solids")
             if session.project().table("calibration"):
                 _link("/ruler", "Measure a length in the pictures")
 
@@ -92,7 +92,7 @@ def _measurements_card(session: Session, table: dict[str, Any]) -> None:
     if not files:
         return
     with ui.element("div").classes("card").style("width: 360px"):
-        ui.label("A person who was measured").classes("name")
+        ui.label("A measured person").classes("name")
         present = table.get("measurements")
         choice = ui.select(files, label="Yeadon's measurements", value=present if present in files else files[0])
         choice.props("outlined dense options-dense")

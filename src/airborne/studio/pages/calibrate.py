@@ -34,13 +34,14 @@ from airborne.studio.session import Session
 
 _BOARD = "board.toml"  # of a new one
 _HELP = (
-    "Each camera films the board close by, in every corner of its picture and tilted; then two cameras at once, until "
-    "all are linked. Or wave a wand, two balls unlike all else on a dark stick: it is found by itself."
+    "Show the board to each camera close by, tilted, and in every corner of its picture; then to two cameras at once, "
+    "until all are linked. Or wave a wand, a dark stick with two balls of a colour that nothing else has: it is found "
+    "automatically."
 )
 _PICTURES_HELP = "Points should cover each camera's image, and their arrows should point in all directions."
 _FILMED = "found in the videos"  # of a wand, instead of its table
 _WAND_HELP = (
-    "If the wand is not found, click its two ends in some twenty frames in the step Digitise. Or track them in DLTdv, "
+    "If the wand is not found, click its two ends in about twenty frames in the step Digitise. Or track them in DLTdv, "
     "easyWand or Argus, and put that table (…xypts.csv) beside the videos."
 )
 
@@ -57,7 +58,8 @@ class CalibratePanel:
         """Lay out the button that opens it, both ways, and what came of it."""
         folder = self.session.folder
         boards, wands = list_boards(folder), list_wands(folder)
-        with ui.dialog() as dialog, ui.card().style("max-width: min(1100px, 92vw)"):
+        name = 'aria-label="calibrate with a board or a wand"'
+        with ui.dialog().props(name) as dialog, ui.card().style("max-width: min(1100px, 92vw)"):
             ui.html("<h2>Calibrate with a board or a wand</h2>", sanitize=False)
             ui.label(_HELP).classes("help small")
             with ui.element("div").classes("row-line"):
@@ -72,8 +74,8 @@ class CalibratePanel:
             with ui.element("div").classes("row-line"):
                 self.wand = ui.select([*wands, _FILMED], label="wand", value=[*wands, _FILMED][0])
                 self.wand.props("outlined dense options-dense").style("min-width: 180px")
-                self.length = ui.number("its length [m]", min=0.05, max=10, value=0.5, step=0.001)
-                self.length.props("outlined dense").style("width: 120px")
+                self.length = ui.number("length of the wand [m]", min=0.05, max=10, value=0.5, step=0.001)
+                self.length.props("outlined dense").style("width: 170px")
                 wand = ui.button("Calibrate with the wand", on_click=self.use_wand).props("unelevated")
             ui.label(_WAND_HELP).classes("soft small").style("white-space: normal")
             with ui.element("div").classes("row-line"):
@@ -124,7 +126,7 @@ class CalibratePanel:
     def _video_choices(self) -> None:
         names = [path.name for path in list_videos(self.session.folder)]
         for camera in self.shown.names:
-            choice = ui.select(names, label=f"{camera} films it in", value=self.videos[camera])
+            choice = ui.select(names, label=f"video of {camera}", value=self.videos[camera])
             choice.bind_value(self.videos, camera)
             choice.props("outlined dense options-dense").style("min-width: 150px")
 
@@ -152,7 +154,7 @@ class CalibratePanel:
                     self.board.set_options(list_boards(self.session.folder), value=_BOARD)
 
             ui.button("Describe a new board", on_click=write).props("outline")
-        ui.label("A chessboard has no markers, 0 mm, and its inner corners are counted.").classes("soft small")
+        ui.label("For a chessboard, count the inner corners, and give 0 mm for the markers.").classes("soft small")
 
     def _show_results(self) -> None:
         """Show what the last calibration said, and where each camera saw points."""

@@ -29,8 +29,8 @@ from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras
 
 _HELP = (
-    "To use a calibration of any program, put its file beside the videos and reload this page. Or click surveyed "
-    "points, or those of a court: six in each camera at least, spread over the space in which the body moves; "
+    "To use a calibration from another program, put its file beside the videos and reload this page. Or click surveyed "
+    "points, or those of a court: at least six in each camera, spread over the space in which the body moves; "
     "residuals are drawn ten times as long. Or calibrate with a board or a wand."
 )
 

@@ -30,8 +30,9 @@ _POINTS = ("torso", *LEG_POINTS, "foot_left", "foot_right")
 _NEEDED = _POINTS[:7]
 _STORED_COLOUR = "#f5f6f7"  # of players whom the trial has
 _HELP = (
-    "Go to the frame where tracking shall start. Click each player's torso, the middle of hips and shoulders, and the "
-    "joints of the legs, in two cameras or more. Who is clicked by the torso alone is not tracked, but hides others."
+    "Go to the frame where tracking starts. Click each player's torso, midway between hips and shoulders, and the "
+    "joints of the legs, in two cameras or more. A player with only the torso clicked is not tracked, but counts as "
+    "hiding others."
 )
 
 
@@ -143,7 +144,7 @@ class PlayersPanel(PointsPanel):
         stored = self._legs_of_trial(ready) if self.frame == self.start_frame else ()
         self.view.show_over(marks, [*self.epipolar_items(self.chosen, self.rig), *stored, *legs], self.selected)
         own = f"The trial's start, frame {self.start_frame}: {', '.join(self.starts)}. " if self.starts else ""
-        self.note.set_text(f"{own}Ready to be used: {', '.join(ready) or 'nobody clicked yet'}.")
+        self.note.set_text(f"{own}{'Ready to use: ' + ', '.join(ready) if ready else 'No player is ready to use yet'}.")
         self.use.set_visibility(bool(ready))
         self.list.show(_POINTS, self.chosen, partial(self.off_px, rig=self.rig))
 

@@ -107,7 +107,7 @@ class ClickPanel(PointsPanel):
     def begin_by_hand(self) -> None:
         """Show the body upright where the cameras look, to be dragged."""
         self.hand.place(standing_pose(self.model, self.rig))
-        self.take_pose("Drag the body, its limbs, and with Shift its turn.", "body placed by hand")
+        self.take_pose("Drag the body or its limbs; Shift turns it.", "body placed by hand")
 
     def place(self, pose: Pose, says: str) -> None:
         """Show a pose that is not fitted to the clicks."""

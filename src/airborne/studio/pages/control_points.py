@@ -11,7 +11,7 @@ from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.court import court_lines
 from airborne.cameras import Rig
 from airborne.cameras.finding import Finding
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, count
 from airborne.studio.clicks import Clicked, count_clicked, read_clicked
 from airborne.studio.pages.layout import complain, errors_shown, show_findings
 from airborne.studio.pages.point_list import PointList
@@ -172,7 +172,7 @@ class ControlPointsPanel(PointsPanel):
             elif n >= FEWEST_POINTS:
                 text, tone = f"{n} points, solving", "soft"
             else:
-                text, tone = f"{n} of {FEWEST_POINTS} points at least", "warn"
+                text, tone = f"{count(n, 'point')} of the {FEWEST_POINTS} that are needed", "warn"
             with ui.element("div"):
                 ui.label(camera).classes("name")
                 ui.label(text).classes(f"{tone} small")

@@ -20,8 +20,8 @@ from airborne.studio.view import CameraViews
 
 _USE = "Use these players"
 _HELP = (
-    "Players at the net are looked for where they stand, which takes a minute or two. The world must be the court's: "
-    "its origin under the middle of the net, x along the net."
+    "Players at the net are searched for where they stand; this takes a minute or two. The world's axes must be those "
+    "of the court: the origin under the middle of the net, x along the net."
 )
 
 

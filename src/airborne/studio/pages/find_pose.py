@@ -28,7 +28,7 @@ from airborne.studio.starts import (
 )
 from airborne.studio.view import CameraViews, Drag
 
-_HELP = "The body is looked for where it stands out from the empty scene, which takes a minute or two."
+_HELP = "The body is searched for where it stands out from the empty scene; this takes a minute or two."
 _USE = "Use this pose"
 _START = ("frame", "position_m", "quaternion_xyzw", "joint_angles_deg")  # what is written of an answer
 

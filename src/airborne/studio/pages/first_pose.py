@@ -16,8 +16,8 @@ from airborne.studio.pages.layout import complain, in_thread, name_missing_steps
 from airborne.studio.session import Session
 from airborne.studio.starts import drafted_start
 
-_HELP = "Choose the frame where tracking shall start, and place the body there. Each later frame follows from it."
-_CLICK, _FIND = "Click the points", "Let it be found"
+_HELP = "Choose the frame where tracking starts, and place the body there. Each later frame follows from it."
+_CLICK, _FIND = "Click the points", "Find automatically"
 
 
 async def first_pose_page(session: Session) -> None:

@@ -12,7 +12,7 @@ from airborne.studio.pages.layout import complain, work
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.session import Session
 
-FITTED = "The pose is fitted to the pictures; pink is the one before."
+FITTED = "The pose is fitted to the pictures; the one before is pink."
 
 
 class FitButton:
@@ -29,7 +29,7 @@ class FitButton:
         """Track the frame alone, from the hand's pose."""
         hand, before, frame = self.hand, self.hand.pose, self._frame_of()
         if before is None:
-            complain("place the body by hand first, let it be found, or click its landmarks")
+            complain("place the body by hand first, find it automatically, or click its landmarks")
             return
         after = await work("fitting the body", lambda: fit_to_frame(self.session, hand.model, frame, before))
         if after is not None and hand.pose is before:

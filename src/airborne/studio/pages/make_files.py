@@ -23,7 +23,7 @@ class Making:
         self._folder = folder
         ui.label("For other programs").classes("soft")
         with ui.element("div").classes("row-line"):
-            self._formats = ui.select(list(EXPORT_FORMATS), label="formats, or all", value=[], multiple=True)
+            self._formats = ui.select(list(EXPORT_FORMATS), label="formats (none: all)", value=[], multiple=True)
             self._formats.props("outlined dense options-dense").style("min-width: 220px")
             buttons = [ui.button("Export", on_click=self.export).props("outline")]
         if any((folder / FOLDERS[2]).glob("overlay_*.mp4")):
@@ -31,7 +31,7 @@ class Making:
             with ui.element("div").classes("row-line"):
                 buttons.append(self._film())
         with ui.element("div").classes("row-line"):
-            self._watch = CommandWatch(session, f"files of {folder.name}", self.tell, words="working")
+            self._watch = CommandWatch(session, f"files of {folder.name}", self.show_files, words="working")
             self._watch.buttons = buttons
         self._links = ui.refreshable(self._list_files)
         self._links()
@@ -48,7 +48,7 @@ class Making:
         words = [word for name, value in ends if value is not None for word in (name, str(int(value)))]
         self._watch.start("film", self._folder.name, "-o", path, *words)
 
-    def tell(self, command: Command) -> None:
+    def show_files(self, command: Command) -> None:
         """Show what was made."""
         self._watch.says.set_text(f"done: {command.line}")
         self._links.refresh()

@@ -17,7 +17,7 @@ from airborne.studio.pages.make_files import Making
 from airborne.studio.project import list_outer_runs, list_runs
 from airborne.studio.session import Session
 
-_HELP = "The report stands alone: one file, to be sent or printed. Tables open in any spreadsheet."
+_HELP = "The report is one file, to send or to print. The tables open in any spreadsheet."
 _NUMBERS = {
     "n_frames": "frames",
     "n_tracked": "tracked",

@@ -66,7 +66,7 @@ async def review_page(session: Session) -> None:
         with ui.element("div").classes("row-line"):
             choice = ui.select(names, label="run", value=names[0], on_change=change)
             choice.props("outlined dense options-dense").style("min-width: 180px")
-            beside = ui.select([""], label="over it", value="", on_change=change)
+            beside = ui.select([""], label="Compare with", value="", on_change=change)
             beside.props("outlined dense options-dense").style("min-width: 150px")
             beside.set_visibility(len(names) > 1)
             jumps = ui.element("div").classes("row-line")
@@ -75,9 +75,9 @@ async def review_page(session: Session) -> None:
         content = ui.element("div").classes("split").style("flex-direction: column")
         with jumps:
             for status in (Status.UNCERTAIN, Status.LOST):
-                go = ui.button(f"next {status.value}").props("flat")
+                go = ui.button(f"Next {status.value}").props("flat")
                 nexts[status] = go.on_click(lambda _, to=status: _jump(session.folder / choice.value, frame(), to))
-            blame = ui.button("which camera disagrees?").props("flat")
+            blame = ui.button("Which camera disagrees?").props("flat")
             blame.on_click(lambda: _blame(session, shown, session.folder / choice.value, frame(), says))
         await change()
 

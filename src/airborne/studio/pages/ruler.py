@@ -22,7 +22,7 @@ from airborne.types import Array
 _FILE, _ENDS = "ruler.csv", ("from", "to")
 _HELP = (
     "Click one end in two cameras or more, press N, and click the other end. "
-    "The deviation is that of the clicks, 1 px each; errors of the calibration come on top."
+    "The standard deviation counts clicks that are 1 px off; errors of the calibration come on top."
 )
 
 
@@ -88,7 +88,7 @@ class RulerPanel(PointsPanel):
         self.view.show_over(list(self._marks()), items, self.selected)
         self.list.show(_ENDS, self.chosen, partial(self.off_px, rig=self.rig))
         if not np.isfinite(places).all():
-            self.says.set_text("Each end is to be clicked in two cameras.")
+            self.says.set_text("Click each end in at least two cameras.")
             return
         clicks = [self.px(name, self.rig.names) for name in _ENDS]
         far_m, sd_m = measure_between(self.rig, *clicks, sd_px=CLICK_SD_PX)

@@ -20,15 +20,15 @@ from airborne.sync.offsets import fit_line
 
 _HELP = (
     "Step each camera to the same event, a foot that lands or a ball that is hit, and press E. "
-    "Several events narrow the offset down: each says it to within half a picture."
+    "Several events narrow the offset down: each gives it to within half a frame."
 )
 _DRAFT = "events"  # their name among the drafts: the two videos -> pairs of pictures
-_WAYS = {"motion": "what moves", "flash": "a flash", "sound": "sound", "tracking": "tracking the body"}
+_WAYS = {"motion": "motion", "flash": "a flash", "sound": "sound", "tracking": "tracking the body"}
 
 
 async def sync_page(session: Session) -> None:
     """Let the user find the offset of each camera from the first one's clock."""
-    async with page_frame(session, "Videos", "When is each camera?", _HELP) as changed:
+    async with page_frame(session, "Videos", "Are the cameras synchronised?", _HELP) as changed:
         if len(session.project().cameras) < 2:
             ui.label("Choose two cameras or more first, in the step Videos.").classes("warn")
             return
@@ -55,7 +55,7 @@ class _Panel:
             choice = ui.select(names, label="camera", value=1, on_change=lambda event: self.choose(event.value))
             choice.props("outlined dense options-dense").style("min-width: 160px")
             ui.button("Same event", on_click=self.add).props("unelevated")
-            ui.button("Take the last back", on_click=self.take_back).props("flat dense")
+            ui.button("Remove the last event", on_click=self.take_back).props("flat dense")
             self.use = ui.button("Use this offset", on_click=self.write).props("unelevated")
             self.says = ui.label().classes("small")
         with ui.element("div").classes("split"):
@@ -64,11 +64,11 @@ class _Panel:
                 CameraViews(self.shown, frame=0, camera=0, on_frame=lambda number: self.turn(0, number))
             self.right = ui.element("div").classes("wide")
         with ui.element("div").classes("row-line"):
-            ui.label("Or let it be found:").classes("soft")
+            ui.label("Or find it automatically:").classes("soft")
             way = ui.select(_WAYS, label="from", value="motion").props("outlined dense options-dense")
             way.style("min-width: 160px")
             find = ui.button("Find the offsets", on_click=lambda: self.start(way.value)).props("outline")
-            self.watch = CommandWatch(self.session, "sync", self.tell, words="looking for the offsets")
+            self.watch = CommandWatch(self.session, "sync", self.show_answer, words="looking for the offsets")
             self.watch.buttons = [find]
             self.watch.says.style("white-space: pre-line")
         self.choose(1)
@@ -138,7 +138,7 @@ class _Panel:
         cameras: list[dict[str, object]] = [{"video": each.video} for each in self.session.project().cameras]
         cameras[self.other] |= {"offset_s": round(offset_s, 6), "offset_sd_s": round(sd_s, 6)}
         with errors_shown():
-            what = f"{table.name} is {1e3 * offset_s:+.1f} ms off"
+            what = f"offset of {table.name}: {1e3 * offset_s:+.1f} ms"
             self.session.edit_trial(lambda text: with_cameras(text, self.session.folder.name, cameras), what)
             ui.notify(f"written: {what}", type="positive")
 
@@ -180,6 +180,6 @@ class _Panel:
         trial = self.session.path.name
         self.watch.start("sync", trial, "--by", way, writes=trial, what="offsets found")
 
-    def tell(self, command: Command) -> None:
+    def show_answer(self, command: Command) -> None:
         """Show what it has found."""
         self.watch.says.set_text(command.output().strip())

@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, count
 from airborne.io.names import check_name
 from airborne.studio.field_order import ORDERS
 from airborne.studio.folder import outer_files
@@ -19,9 +19,9 @@ from airborne.studio.trial_edits import with_cameras
 from airborne.video import VideoFacts, VideoSource, inspect
 
 _FIELDS = {
-    "progressive": "whole pictures",
-    "top-first": "two fields, top first",
-    "bottom-first": "two fields, bottom first",
+    "progressive": "progressive",
+    "top-first": "interlaced, top field first",
+    "bottom-first": "interlaced, bottom field first",
     "auto": "as the file's flags say",
 }
 
@@ -40,7 +40,7 @@ async def videos_page(session: Session) -> None:
     """Show the folder's videos, and write those chosen as cameras into the trial."""
     text = (
         "Tick the files that are cameras of one recording; the first one is the clock. "
-        "A file that holds two fields in a picture gives twice as many images a second."
+        "Interlaced files hold two fields in each picture, and so give twice as many images a second."
     )
     async with page_frame(session, "Videos", "Which videos are the cameras?", text, scrolls=True):
         project = session.project()
@@ -117,7 +117,7 @@ def _show_orders(choice: _Choice, facts: VideoFacts) -> None:
                 picture = ui.element("img").props(f"src=/fields/{order}/{quote(choice.video)}")
                 picture.style("width: 100%; height: auto")
                 picture._props["alt"] = f"{choice.video}, {_FIELDS[order]}"
-                ui.label(_FIELDS[order].removeprefix("two fields, ")).classes("small")
+                ui.label(_FIELDS[order].removeprefix("interlaced, ")).classes("small")
 
 
 def _describe(facts: VideoFacts, fields: str) -> str:
@@ -154,6 +154,6 @@ def _save(session: Session, choices: list[_Choice]) -> None:
     ]
     with errors_shown():
         session.edit_trial(
-            lambda text: with_cameras(text, session.folder.name, tables), f"{len(chosen)} cameras chosen"
+            lambda text: with_cameras(text, session.folder.name, tables), f"{count(len(chosen), 'camera')} chosen"
         )
         ui.notify(f"{session.path.name} is written: {', '.join(names)}", type="positive")
