@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import SAMPLED, Pose, human18
 from airborne.cameras import Rig, camera_looking_at
-from airborne.studio.dragging import Pin, grip_at, grip_landmark, landmarks_of_grip, landmarks_px, pull, turn_with
+from airborne.studio.dragging import Pin, drag_pose, grip_at, grip_landmark, landmarks_of_grip, landmarks_px, turn_with
 
 SIZE = (640, 480)
 MODEL = human18(1.75, 70.0, outfit=SAMPLED)
@@ -35,7 +35,7 @@ def landmark_px(pose, camera, name):
 def test_a_wrist_goes_where_it_is_dragged_and_the_other_limbs_stay(rig, taken):
     camera, grip = rig["a"], grip_landmark(MODEL, "wrist_left")
     target = np.add(landmark_px(taken, camera, "wrist_left"), [14.0, -11.0])
-    pose = pull(MODEL, taken, taken, [Pin(grip, camera, target)])
+    pose = drag_pose(MODEL, taken, taken, [Pin(grip, camera, target)])
     np.testing.assert_allclose(landmark_px(pose, camera, "wrist_left"), target, atol=HERE_PX)
     still = [NAMES.index(name) for name in NAMES if name not in landmarks_of_grip(MODEL, grip)]
     before, after = (MODEL.with_pose(each).landmarks[still] for each in (taken, pose))
@@ -48,7 +48,7 @@ def test_a_body_taken_by_its_trunk_moves_across_the_line_of_sight_and_not_along_
     grip = grip_at(MODEL.with_pose(taken), camera, landmark_px(taken, camera, "torso"))
     posed = MODEL.with_pose(taken)
     start = camera.px_from_world(posed.R[grip.segment] @ grip.point_m + posed.t[grip.segment])
-    pose = pull(MODEL, taken, taken, [Pin(grip, camera, np.add(start, [40.0, 10.0]))])
+    pose = drag_pose(MODEL, taken, taken, [Pin(grip, camera, np.add(start, [40.0, 10.0]))])
     moved = pose.world_from_root.translation - taken.world_from_root.translation
     along = camera.camera_from_world.rotation.apply(moved)[2]
     assert np.linalg.norm(moved) > 0.2
@@ -60,16 +60,16 @@ def test_drags_in_two_views_set_how_far_away_the_body_is(rig, taken):
     there = Pose(world_from_root=RigidTransform.from_components([0.5, 0.35, 1.2], taken.world_from_root.rotation))
     grip = grip_landmark(MODEL, "pelvis")
     first = Pin(grip, rig["a"], landmark_px(there, rig["a"], "pelvis"))
-    pose = pull(MODEL, taken, taken, [first])
+    pose = drag_pose(MODEL, taken, taken, [first])
     assert np.linalg.norm(pose.world_from_root.translation - there.world_from_root.translation) > 0.05
-    pose = pull(MODEL, pose, pose, [first, Pin(grip, rig["b"], landmark_px(there, rig["b"], "pelvis"))])
+    pose = drag_pose(MODEL, pose, pose, [first, Pin(grip, rig["b"], landmark_px(there, rig["b"], "pelvis"))])
     np.testing.assert_allclose(pose.world_from_root.translation, there.world_from_root.translation, atol=0.003)
 
 
 def test_with_shift_the_body_turns_about_its_root(rig, taken):
     camera, grip = rig["a"], turn_with(grip_landmark(MODEL, "head"))
     target = np.add(landmark_px(taken, camera, "head"), [15.0, 4.0])
-    pose = pull(MODEL, taken, taken, [Pin(grip, camera, target)])
+    pose = drag_pose(MODEL, taken, taken, [Pin(grip, camera, target)])
     np.testing.assert_allclose(landmark_px(pose, camera, "head"), target, atol=HERE_PX)
     np.testing.assert_allclose(pose.world_from_root.translation, taken.world_from_root.translation)
 
@@ -78,7 +78,7 @@ def test_what_cannot_be_reached_is_approached_within_the_limits(rig, taken):
     camera, grip = rig["b"], grip_landmark(MODEL, "wrist_left")
     start = landmark_px(taken, camera, "wrist_left")
     target = np.add(start, [250.0, 0.0])
-    pose = pull(MODEL, taken, taken, [Pin(grip, camera, target)])
+    pose = drag_pose(MODEL, taken, taken, [Pin(grip, camera, target)])
     assert abs(landmark_px(pose, camera, "wrist_left") - target).max() < abs(start - target).max()
     assert MODEL.is_within_limits(pose)
 

@@ -80,7 +80,7 @@ def turn_with(grip: Grip) -> Grip:
     return Grip(grip.segment, grip.point_m, np.arange(3, 6))
 
 
-def pull(model: BodyModel, pose: Pose, taken: Pose, pins: Sequence[Pin]) -> Pose:
+def drag_pose(model: BodyModel, pose: Pose, taken: Pose, pins: Sequence[Pin]) -> Pose:
     """Return the pose that brings held points to their pixels, looked for from `pose`; what moves is the last one's.
 
     `taken` is the pose in which the body was taken, to which it stays as near as it can.

@@ -10,13 +10,13 @@ import numpy as np
 
 from airborne.body import BodyModel, Pose
 from airborne.cameras import Camera
-from airborne.studio.dragging import Grip, Pin, grip_at, grip_landmark, pull, turn_with
+from airborne.studio.dragging import Grip, Pin, drag_pose, grip_at, grip_landmark, turn_with
 from airborne.studio.outlines import outline_items
 from airborne.studio.pages.layout import in_thread
 from airborne.studio.starts import POSE_COLOUR
 from airborne.studio.view import CameraViews, Drag, Mark
 
-DRAG_HELP = "Drag a limb, or the whole by its trunk; with Shift it turns. A drag in a second picture sets the distance."
+DRAG_HELP = "Drag a limb, or the whole body by its trunk; Shift turns it. A drag in a second picture sets the distance."
 SET_BY_HAND = "The pose was set by hand."
 KEPT = "The outline is the pose that was made here last."
 STORED = "The outline is the pose that the trial has."
@@ -79,7 +79,7 @@ class PoseHand:
             return False, (None, None)
         pin = Pin(self._grip, camera, np.array(drag.px))
         others = [each for name, each in self._pins.items() if name != camera.name]
-        self.pose = pull(self.model, self.pose, self._taken, [*others, pin])
+        self.pose = drag_pose(self.model, self.pose, self._taken, [*others, pin])
         if drag.has_ended:
             if not drag.turns:
                 self._pins[camera.name] = pin
