@@ -218,7 +218,7 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
     else:
         yield StudioStep("Track", "/track", "needs you" if is_prepared else "empty", "follow the body")
     yield StudioStep("Review", "/review", "ready" if runs else "empty", runs[0].name if runs else "no run yet")
-    files = sorted(path.name for path in project.folder.glob("digitised_*_*.csv"))
+    files = sorted(path.name for path in project.folder.glob("digitised_*_*[0-9].csv"))  # not the paths of joints
     state: StepState = "ready" if files else "empty"
     yield StudioStep("Digitise", "/digitise", state, files[-1] if files else "points by hand, to compare")
     finished = [run for run in runs if (run / SUMMARY).is_file()]

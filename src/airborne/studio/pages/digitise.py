@@ -139,7 +139,8 @@ class DigitisePanel(PointsPanel):
             choice.props("outlined dense options-dense").style("width: 110px")
             ui.button("Compare", on_click=lambda: self.compare(self.session.folder / choice.value)).props("flat dense")
             agree = ui.button("Agreement", on_click=lambda: self.agree(self.session.folder / choice.value))
-            agree.props("flat dense").tooltip("of the run and of all who digitised")
+            whom = "these clicks" if self._is_person else "everyone who digitised"
+            agree.props("flat dense").tooltip(f"between the run and {whom}")
 
     async def turn_to(self, frame: int) -> None:
         """Show the clicks of another frame."""
@@ -216,25 +217,38 @@ class DigitisePanel(PointsPanel):
         """Compare a run with these clicks, into its summary and report too."""
         found = await work("comparing", lambda: self._compare(run))
         if found is not None:
-            _tell(found)
+            _show_tables(found)
 
     def _compare(self, run: Path) -> str:
-        path = self.session.file(self.file)
-        if self.model is not None and self.model.has_joints:
-            paths = path.with_name(f"{path.stem}_joints.csv")
-            text = joint_paths_text(self.table, self.session.rig(), run_rows(run))
-            self.session.edit(paths.name, text, "paths of the clicked joints")
-            return assess(run, None, None, paths)["joints"].describe()
-        return assess(run, None, path)["digitised"].describe()
+        if self._is_person:
+            return assess(run, None, None, self._write_paths(run))["joints"].describe()
+        return assess(run, None, self.session.file(self.file))["digitised"].describe()
 
     async def agree(self, run: Path) -> None:
-        """Say how well all people and repetitions agree with each other and with a run."""
+        """Say how well a run agrees with the clicks, and of a thing all people and repetitions with each other."""
+        found = await work("comparing", lambda: self._agree(run))
+        if found is not None:
+            _show_tables(found)
+
+    def _agree(self, run: Path) -> str:
+        if self._is_person:
+            return evaluate_agreement(run, joints=self._write_paths(run)).describe()
         own = self.session.file(self.file)
         others = [self.session.folder / each.file for each in list_repetitions(self.session.folder)]
         others = [path for path in others if path != own]
-        found = await work("comparing", lambda: evaluate_agreement(run, digitised=own, operators=others).describe())
-        if found is not None:
-            _tell(found)
+        return evaluate_agreement(run, digitised=own, operators=others).describe()
+
+    @property
+    def _is_person(self) -> bool:
+        """Whether landmarks are clicked, which are compared one by one, not as a rigid body's pose."""
+        return self.model is not None and self.model.has_joints
+
+    def _write_paths(self, run: Path) -> Path:
+        """Write where the clicked landmarks are in space, and return the file's path."""
+        name = f"{Path(self.file).stem}_joints.csv"
+        text = joint_paths_text(self.table, self.session.rig(), run_rows(run))
+        self.session.edit(name, text, "paths of the clicked joints")
+        return self.session.file(name)
 
     def show(self) -> None:
         """Show marks, curves and lists as they are now."""
@@ -281,8 +295,8 @@ class DigitisePanel(PointsPanel):
         return clicks_of_frame(self.table, self.frame, self.shown.names)
 
 
-def _tell(text: str) -> None:
+def _show_tables(text: str) -> None:
     """Show a comparison's tables."""
-    with ui.dialog(value=True) as dialog, ui.card().style("max-width: 90vw"):
+    with ui.dialog(value=True).props("aria-label=comparison") as dialog, ui.card().style("max-width: 90vw"):
         ui.label(text).style("white-space: pre; overflow: auto; font: 12px ui-monospace, monospace")
         ui.button("Close", on_click=dialog.close).props("flat")
