@@ -263,10 +263,10 @@ def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
     with open_studio(folder) as address, open_page(address, is_watched=False) as page:
         found = {"results, for the first time: Review open": [review_ms(page, address)]}
     with open_studio(folder) as address, open_page(address, is_watched=False) as page:
-        for name in ("results", "team"):
+        for name, n_frames in (("results", N_MANY), ("team", N_TEAM_FRAMES)):
             os.utime(folder / name)
             found |= {f"{name}: Review open": [review_ms(page, address)]}
-            found |= {f"{name}: step": step_ms(page, 20), f"{name}: jump": jump_ms(page, N_TEAM_FRAMES)[0]}
+            found |= {f"{name}: step": step_ms(page, 20), f"{name}: jump": jump_ms(page, n_frames)[0]}
             page.evaluate("document.querySelector('canvas.view').view.go(0)")
             wait_for_frame(page, 0)
         begun = time.monotonic()
