@@ -137,7 +137,7 @@ def _guide(session: Session, here: str) -> None:
 
 
 def _sheet() -> ui.dialog:
-    with ui.dialog() as dialog, ui.card():
+    with ui.dialog().props("aria-label=keys") as dialog, ui.card():
         ui.html("<h2>Keys</h2>", sanitize=False)
         rows = "".join(f"<tr><th><kbd>{key}</kbd></th><td>{what}</td></tr>" for key, what in _KEYS.items())
         ui.html(f'<table class="plain">{rows}</table>', sanitize=False)
@@ -147,7 +147,7 @@ def _sheet() -> ui.dialog:
 
 def _example(here: str) -> ui.dialog:
     """Lay out a picture of a step that is done well: of the thrown cross."""
-    with ui.dialog() as dialog, ui.card().style("max-width: min(1120px, 94vw)"):
+    with ui.dialog().props('aria-label="an example"') as dialog, ui.card().style("max-width: min(1120px, 94vw)"):
         ui.html(f"<h2>{here}: the thrown cross</h2>", sanitize=False)
         name = here.lower().replace(" ", "_")
         picture = ui.element("img").props(f"src=/example/{name}.jpg loading=lazy").style("width: 100%; height: auto")
@@ -189,8 +189,9 @@ def errors_shown() -> Iterator[None]:
 
 
 def complain(error: AirborneError | str) -> None:
-    """Show what is wrong."""
-    ui.notify(str(error), type="warning", multi_line=True, timeout=10_000, close_button="Close")
+    """Show what is wrong, in the place of what was wrong before."""
+    own = {"group": "complaint", "badgeStyle": "display: none"}
+    ui.notify(str(error), type="warning", multi_line=True, timeout=10_000, close_button="Close", **own)
 
 
 async def in_thread(function: Callable[..., _T], *arguments: object) -> _T:

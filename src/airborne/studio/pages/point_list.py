@@ -56,7 +56,7 @@ class PointList:
             ui.label("off [px]")
             ui.element("div").classes("gap")
             for camera in self._cameras:
-                ui.label(camera).classes("n")._props["title"] = camera  # which may be cut
+                ui.label(camera).classes("n")
 
     def _build(self, names: Sequence[str]) -> None:
         self._card.clear()
