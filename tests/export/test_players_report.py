@@ -7,6 +7,7 @@ from airborne.export.players_report import players_summary, write_players_report
 from airborne.motion import measure_jumps
 from airborne.motion.jumps.table import jump_row
 from tests.support import jumping
+from tests.support.studio import open_file
 
 COUNTS = {
     **{"n_tracked": 150, "n_uncertain": 0, "n_lost": 0, "n_fewer_cameras": 0, "n_below_two_cameras": 0},
@@ -47,3 +48,17 @@ def test_a_height_that_nobody_saw_is_unknown_and_uncertain_frames_are_said(tmp_p
     assert first.startswith(f"one, jump 1: {UNKNOWN_TEXT}, hips over standing")
     assert first.endswith("; 4 of its frames are uncertain")
     assert f"<b>{UNKNOWN_TEXT}</b>" in write_players_report(tmp_path, summary_of([row]), motion).read_text()
+
+
+def test_its_viewer_shows_one_frame_in_a_browser(tmp_path):
+    motion = jumping.motion_of(jumping.Jumper())
+    (jump,) = measure_jumps(motion)
+    write_players_report(tmp_path, summary_of([jump_row(jump)]), motion)
+    with open_file(tmp_path / "report.html") as page:
+        view, solid = page.locator("#viewer"), page.locator(".in-3d")
+        assert view.get_attribute("data-frame") == str(motion.index[0])
+        before = solid.screenshot()
+        page.locator("#viewer .at").fill("70")  # in the air
+        assert view.get_attribute("data-frame") == str(motion.index[70])
+        assert f"frame {motion.index[70]}, {motion.time_s[70]:.3f} s" in page.locator(".now").inner_text()
+        assert solid.screenshot() != before

@@ -1,7 +1,8 @@
-"""The guided walk says something at every step, and goes on where a step is done."""
+"""The guided walk says something at every step, and goes on where a step is done; `--demo` opens it."""
 
 from airborne.studio.guide import next_task
 from airborne.studio.project import find_trial, read_project, steps
+from tests.support.studio import fork_studio, open_page
 
 
 def test_the_walk_goes_from_step_to_step(tmp_path):
@@ -14,3 +15,13 @@ def test_the_walk_goes_from_step_to_step(tmp_path):
     task, following = next_task(read_project(*find_trial(tmp_path)), "Videos")
     assert "Use these cameras" in task
     assert following.name == "Cameras"
+
+
+def test_the_demo_walks_through_a_copy_of_the_example(tmp_path):
+    with fork_studio(tmp_path / "any", "--demo") as address, open_page(address) as page:
+        page.get_by_text("Three cameras filmed a wooden cross that was thrown.").wait_for()
+        page.get_by_role("button", name="Use these cameras").click()
+        page.get_by_role("link", name="Next: Cameras").click()
+        page.get_by_text("as surveyed points: their clicks are in it").wait_for()
+    copied = {path.name for path in (tmp_path / "airborne-studio-demo").iterdir() if path.is_file()}
+    assert copied == {"cam1.mp4", "cam2.mp4", "cam3.mp4", "control_points.csv", "cross.toml", "trial.toml"}

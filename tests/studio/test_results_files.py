@@ -39,4 +39,9 @@ def test_a_film_and_an_export_are_made_and_linked(folder):
         link = page.get_by_role("link", name="film.mp4").get_attribute("href")
         answer = page.request.get("/".join(address.split("/")[:3]) + link)
         assert answer.ok and answer.body() == (folder / "results" / "videos" / "film.mp4").read_bytes()
+        page.get_by_label("kind").click()
+        page.get_by_role("option", name="gif").click()
+        page.get_by_role("button", name="Make a film").click()
+        page.get_by_text("film.gif", exact=True).wait_for(timeout=2 * MINUTE)
     assert (folder / "results" / "export" / "results.c3d").stat().st_size > 0
+    assert (folder / "results" / "videos" / "film.gif").read_bytes().startswith(b"GIF8")
