@@ -68,7 +68,7 @@ class PlayersPanel(PointsPanel):
                     self.choice = ui.select([], label="player", on_change=lambda event: self.take(event.value))
                     self.choice.props("outlined dense options-dense")
                     with ui.element("div").classes("row-line"):
-                        self.new = ui.input("another player's name").props("outlined dense").style("width: 150px")
+                        self.new = ui.input("another player's name").props("outlined dense").style("width: 195px")
                         ui.button("Add", on_click=self.add).props("outline")
                     self.note = ui.label().classes("small")
                     self.use = ui.button("Use these players", on_click=self.write).props("unelevated")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from nicegui import Client, app, run, ui
 
@@ -190,7 +190,7 @@ def errors_shown() -> Iterator[None]:
 
 def complain(error: AirborneError | str) -> None:
     """Show what is wrong, in the place of what was wrong before."""
-    own = {"group": "complaint", "badgeStyle": "display: none"}
+    own: dict[str, Any] = {"group": "complaint", "badgeStyle": "display: none"}
     ui.notify(str(error), type="warning", multi_line=True, timeout=10_000, close_button="Close", **own)
 
 
