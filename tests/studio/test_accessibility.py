@@ -72,6 +72,9 @@ def found(folder):
             page.get_by_role("button", name=button).first.click()
             page.get_by_role("dialog").get_by_text(text).first.wait_for()
             look(page, name)
+            assert page.evaluate(
+                "[...document.querySelectorAll('[role=dialog] img')].every((each) => each.naturalWidth)"
+            )
         (folder / "trial.toml").write_text(TRIAL.replace(PERSON_TABLE, 'body = { preset = "legs" }'))
         go(page, address, "start", "another player's name")
         look(page, "start, of players")

@@ -31,6 +31,11 @@ def test_the_cross_digitised_by_one_person(tmp_path):
         page.get_by_role("switch", name="epipolar help").click()
         page.locator("canvas.view").press(",")
         page.locator(".point .n", has_text=".").first.wait_for()
+        page.get_by_role("button", name="Add", exact=True).click()
+        page.get_by_text("a point's name is 1 to 40 letters").wait_for()
+        page.get_by_role("button", name="Remove", exact=True).click()
+        page.get_by_text("choose a click first").wait_for()
+        assert page.locator(".q-notification.bg-warning").count() == 1  # in the place of the one before
     assert json.loads((folder / "digitised_A_1.json").read_text())["epipolar_help"]
     assert 0 < found_mm <= MOST_MM
     assert 0 < found_deg <= MOST_DEG
