@@ -51,6 +51,23 @@ def run_strips(run: Path) -> tuple[tuple[str, ...], NDArray[np.uint8]]:
     return names, ranks
 
 
+def doubtful_frames(run: Path) -> dict[str, NDArray[np.int64]]:
+    """Return the frames in which the body, a joint of it or a player is uncertain, and those in which one is lost.
+
+    A joint that no picture shows counts as lost here. Raises ResultError.
+    """
+    if holds_players(run):
+        motion = run_players(run)
+        index, ranks = motion.index, ranks_of(motion.status)
+    else:
+        rows, (_, of_joints) = run_rows(run), run_strips(run)
+        n = min(len(rows), len(of_joints))  # a run that goes on has grown meanwhile
+        index, ranks = rows.index[:n], np.column_stack([ranks_of(rows.status[:n]), of_joints[:n]])
+    uncertain, unknown = (ranks_of(np.array(status.value)) for status in (JointStatus.UNCERTAIN, JointStatus.UNKNOWN))
+    is_doubtful = {"uncertain": ranks == uncertain, "lost": ranks >= unknown}
+    return {name: index[of_any.any(axis=1)] for name, of_any in is_doubtful.items()}
+
+
 def _finished_ranks(run: Path, n: int) -> tuple[tuple[str, ...], NDArray[np.uint8]] | None:
     """Return what a finished run's table says of its n frames; None where it has none, or one of another motion."""
     try:

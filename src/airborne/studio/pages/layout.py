@@ -31,6 +31,8 @@ _KEYS = {
     "C": "one camera alone, the next one, all of them",
     "click": "set the chosen point",
     "arrows": "move the chosen point by 0.1 px; with Shift by 1 px",
+    "A": "the next frame in which the body, a joint or a player is uncertain, in Review; with Shift the one before",
+    "R": "the next frame in which one of them is lost, or a joint is in no picture; with Shift the one before",
     "E": "both pictures show the same event, where cameras are synchronised by hand",
     "N P": "choose the next point, the one before",
     "Esc": "let go of the chosen mark",

@@ -17,6 +17,7 @@ from airborne.studio.curve_data import Momenta, curve_kinds, describe_distance, 
 from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR
 from airborne.studio.pages.correct import Correction
+from airborne.studio.pages.jumps import Jumps
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
@@ -24,7 +25,6 @@ from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.stage import Arrow, BodyOnStage, draw_cameras, overview, reach_of
 from airborne.studio.view import CameraViews, Curves
-from airborne.tracking import Status
 
 _MOMENTUM_COLOUR, _LONGEST_M = "#d55e00", 1.0  # its arrow's length where it is greatest in the run
 _HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations."
@@ -41,11 +41,12 @@ async def review_page(session: Session) -> None:
         if shown is None:
             return
         names = [each.name for each in runs]
-        nexts: dict[Status, ui.button] = {}
         view: CameraViews | None = None
 
         def frame() -> int:
             return session.frame if view is None else view.frame
+
+        jumps = Jumps(frame)
 
         async def change() -> None:
             nonlocal view
@@ -54,9 +55,7 @@ async def review_page(session: Session) -> None:
                 beside.set_options(["", *others], value="")  # which calls this again
                 return
             beside.set_options(["", *others])
-            there = await in_thread(_statuses, session.folder / choice.value)
-            for status, button in nexts.items():
-                button.set_enabled(status.value in there)
+            await jumps.turn_to(session.folder / choice.value)
             content.clear()
             with content:
                 folder = session.folder / choice.value
@@ -69,16 +68,12 @@ async def review_page(session: Session) -> None:
             beside = ui.select([""], label="Compare with", value="", on_change=change)
             beside.props("outlined dense options-dense").style("min-width: 150px")
             beside.set_visibility(len(names) > 1)
-            jumps = ui.element("div").classes("row-line")
+            jumps.build()
+            blame = ui.button("Which camera disagrees?").props("flat")
+            blame.on_click(lambda: _blame(session, shown, session.folder / choice.value, frame(), says))
         says = ui.label().classes("small")
         says.bind_visibility_from(says, "text")
         content = ui.element("div").classes("split").style("flex-direction: column")
-        with jumps:
-            for status in (Status.UNCERTAIN, Status.LOST):
-                go = ui.button(f"Next {status.value}").props("flat")
-                nexts[status] = go.on_click(lambda _, to=status: _jump(session.folder / choice.value, frame(), to))
-            blame = ui.button("Which camera disagrees?").props("flat")
-            blame.on_click(lambda: _blame(session, shown, session.folder / choice.value, frame(), says))
         await change()
 
 
@@ -185,21 +180,3 @@ class MomentumArrow:
         self._arrow.show(com_m, L / self._momenta.greatest * _LONGEST_M)
         size = float(np.linalg.norm(L))
         self._says.set_text(f"arrow: angular momentum {size:.3g} ± {sd:.3g} kg m²/s" if size else "")
-
-
-def _statuses(folder: Path) -> set[str]:
-    """Return the statuses that a run of one body has; players have one each, and none of all."""
-    return set() if holds_players(folder) else {str(status) for status in np.unique(run_rows(folder).status)}
-
-
-def _jump(folder: Path, frame: int, status: Status) -> None:
-    """Show the next frame of a status after the one in view, or the first."""
-    rows = run_rows(folder)
-    frames = rows.index[rows.status == status.value]
-    if not len(frames):  # it was tracked again since
-        return
-    later = frames[frames > frame]
-    ui.run_javascript(
-        'window.dispatchEvent(new CustomEvent("airborne-frame", '
-        f"{{detail: {{frame: {int(later[0] if len(later) else frames[0])}, from: null}}}}))"
-    )

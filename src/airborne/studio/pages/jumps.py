@@ -1,0 +1,61 @@
+"""Jumps of the step Review: by button or key to the next frame in which something is uncertain or lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from nicegui import ui
+from nicegui.events import KeyEventArguments
+
+from airborne.studio.pages.layout import complain, errors_shown, in_thread
+from airborne.studio.strips import doubtful_frames
+
+_KEYS = {"a": "uncertain", "r": "lost"}  # as amber and red
+
+
+class Jumps:
+    """One window's buttons and keys, for the run in view."""
+
+    def __init__(self, frame: Callable[[], int]) -> None:
+        """Begin without a run; `frame` says which one the window shows."""
+        self._frame, self._latest = frame, (-1, -1)  # where the latest jump came from, and went
+        self._run: Path | None = None
+        self._buttons: dict[str, ui.button] = {}
+
+    def build(self) -> None:
+        """Lay the buttons out, and listen to the keys."""
+        ui.keyboard(on_key=self.press, ignore=["input", "select", "textarea"])
+        for key, what in _KEYS.items():
+            button = ui.button(f"Next {what}", on_click=lambda _, to=what: self.go(to)).props("flat")
+            self._buttons[what] = button.tooltip(f"the body, a joint or a player; key {key.upper()}")
+
+    async def turn_to(self, run: Path) -> None:
+        """Jump among the frames of this run from now on."""
+        self._run = run
+        with errors_shown():
+            for what, frames in (await in_thread(doubtful_frames, run)).items():
+                self._buttons[what].set_enabled(len(frames) > 0)
+
+    async def press(self, event: KeyEventArguments) -> None:
+        """Jump by key."""
+        what = _KEYS.get(str(event.key).lower())
+        if event.action.keydown and what is not None and not (event.modifiers.ctrl or event.modifiers.meta):
+            await self.go(what, is_back=event.modifiers.shift)
+
+    async def go(self, what: str, *, is_back: bool = False) -> None:
+        """Show the next such frame after the one in view, or the first; or the one before, or the last."""
+        if self._run is None:
+            return
+        with errors_shown():
+            frames = (await in_thread(doubtful_frames, self._run))[what]
+            if not len(frames):
+                complain(f"in no frame of this run is anything {what}")
+                return
+            shown = self._frame()
+            now = self._latest[1] if shown == self._latest[0] else shown  # the next key may come before the pictures
+            left = frames[frames < now][::-1] if is_back else frames[frames > now]
+            frame = int(left[0] if len(left) else frames[-1 if is_back else 0])
+            self._latest = shown, frame
+            detail = f"{{detail: {{frame: {frame}, from: null}}}}"
+            ui.run_javascript(f'window.dispatchEvent(new CustomEvent("airborne-frame", {detail}))')

@@ -1,0 +1,65 @@
+"""In Review a key goes to the next frame in which the body, a joint or a player is in doubt; in a real browser."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from airborne.motion import MotionWriter, read_motion
+from airborne.motion.files import read_estimates
+from airborne.studio.strips import doubtful_frames
+from airborne.tracking import Status
+from tests.support.person_run import write_person_run
+from tests.support.players_trial import rig, write_run, write_trial
+from tests.support.studio import fork_studio, go_home, open_page, wait_for_frame
+
+N, STRAINED, LOST = 12, 3, 9
+
+
+def write_doubtful_run(run):
+    """Write a run of a person whose elbow is uncertain in one frame, and who is lost in another."""
+    write_person_run(run, rig(), N, Fraction(50))
+    estimates, joints = read_estimates(run / "motion.csv"), read_motion(run / "motion.csv").joints
+    elbow = 6 + 3 * joints.index("forearm_left")
+    estimates[STRAINED].covariance[elbow, elbow] = 0.3  # of its turn [rad²]
+    estimates[LOST] = replace(estimates[LOST], status=Status.LOST)
+    (run / "motion.csv").unlink()
+    with MotionWriter(run / "motion.csv", joints) as writer:
+        for each in estimates:
+            writer.append(each)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A trial with a run of a person, and one of two players of whom one is uncertain in frames 3, 7 and 11."""
+    folder = tmp_path_factory.mktemp("studio") / "two"
+    write_trial(folder, N)
+    write_run(folder / "players", N)
+    write_doubtful_run(folder / "person")
+    return folder
+
+
+def test_frames_are_in_doubt_where_any_joint_or_player_is(folder):
+    person, players = doubtful_frames(folder / "person"), doubtful_frames(folder / "players")
+    np.testing.assert_array_equal(person["uncertain"], [STRAINED])
+    np.testing.assert_array_equal(person["lost"], [LOST])
+    np.testing.assert_array_equal(players["uncertain"], [3, 7, 11])
+    assert len(players["lost"]) == 0
+
+
+def test_keys_go_to_the_next_frame_in_doubt_and_back(folder):
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/review?")) as page:
+        for run, ways in (
+            ("person", [("a", STRAINED), ("r", LOST), ("a", STRAINED), ("Shift+R", LOST)]),
+            ("players", [("a", 3), ("a", 7), ("a", 11), ("a", 3), ("Shift+A", 11)]),
+        ):
+            page.get_by_label("run", exact=True).click()
+            page.get_by_role("option", name=run).click()
+            page.get_by_text("next uncertain").wait_for()
+            go_home(page)
+            for key, frame in ways:
+                page.keyboard.press(key)
+                wait_for_frame(page, frame)
+        assert page.get_by_role("button", name="next uncertain").is_enabled()
+        assert not page.get_by_role("button", name="next lost").is_enabled()
