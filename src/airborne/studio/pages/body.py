@@ -30,13 +30,14 @@ async def body_page(session: Session) -> None:
     )
     async with page_frame(session, "Body", "What is tracked?", text, scrolls=True) as changed:
         table = session.project().table("body")
-        bodies = await in_thread(list_bodies, session.folder)
+        bodies = await in_thread(list_bodies, session.folder, says="reading the bodies")
+        measured = await in_thread(list_measurements, session.folder, says="reading the measurements")
         name_outer_links(outer_files(session.folder, BODY_ENDING, *MEASURED_ENDINGS))
         with ui.element("div").classes("row-line").style("align-items: flex-start"):
             if bodies:
                 _thing_card(session, bodies, table)
             _person_card(session, table)
-            _measurements_card(session, table)
+            _measurements_card(session, measured, table)
             _players_card(session)
             scene = ui.refreshable(_show_body)
             await scene(session)
@@ -87,8 +88,7 @@ def _person_card(session: Session, table: dict[str, Any]) -> None:
         ui.button("Use this person", on_click=save).props("unelevated")
 
 
-def _measurements_card(session: Session, table: dict[str, Any]) -> None:
-    files = list_measurements(session.folder)
+def _measurements_card(session: Session, files: list[str], table: dict[str, Any]) -> None:
     if not files:
         return
     with ui.element("div").classes("card").style("width: 360px"):
@@ -104,7 +104,7 @@ def _measurements_card(session: Session, table: dict[str, Any]) -> None:
 async def _show_body(session: Session) -> None:
     """Show the trial's body from all sides; players have none."""
     try:
-        model = await in_thread(session.project().model)
+        model = await in_thread(session.project().model, says="reading the body")
     except AirborneError:
         return
     address = f"/body/mesh/{{part}}?{hash(repr(session.project().table('body')))}"  # another body's parts are others

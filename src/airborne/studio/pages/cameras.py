@@ -45,9 +45,9 @@ async def cameras_page(session: Session) -> None:
         if shown is None:
             return
         wanted = {camera.calibrated_as or camera.name for camera in project.cameras}
-        files = await in_thread(list_calibrations, session.folder, wanted)
+        files = await in_thread(list_calibrations, session.folder, wanted, says="reading the calibrations")
         name_outer_links(outer_files(session.folder, *ENDINGS))
-        surveys = await in_thread(list_surveys, session.folder)
+        surveys = await in_thread(list_surveys, session.folder, says="reading the surveys")
         table = project.table("calibration")
         if not (files.usable or files.renamed or surveys or table):
             ui.label(

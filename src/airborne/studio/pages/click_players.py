@@ -16,7 +16,7 @@ from airborne.errors import AirborneError, count
 from airborne.io.names import check_column
 from airborne.studio.clicks import Clicked
 from airborne.studio.outlines import legs_items, player_colours
-from airborne.studio.pages.layout import complain, errors_shown
+from airborne.studio.pages.layout import complain, errors_shown, in_thread
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -24,6 +24,7 @@ from airborne.studio.session import Session
 from airborne.studio.starts import player_file, read_players, read_start_players
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import Mark
+from airborne.tracking.players import PlayerStart
 from airborne.types import Array
 
 _POINTS = ("torso", *LEG_POINTS, "foot_left", "foot_right")
@@ -44,7 +45,8 @@ class PlayersPanel(PointsPanel):
         super().__init__(session, shown, Clicked((), None, {}), _POINTS[0])
         self.rig, self.frame = rig, frame
         self.players: dict[str, Clicked] = {}
-        self.start_frame, self.starts = read_start_players(session, rig)  # that the trial has
+        self.start_frame = 0
+        self.starts: dict[str, PlayerStart] = {}  # that the trial has
         self.player = "player1"
 
     @property
@@ -90,7 +92,9 @@ class PlayersPanel(PointsPanel):
             self.players = read_players(self.session.folder, self.frame)
             self.players.setdefault(self.player, Clicked((), None, {}))
             self.clicked = self.players[self.player]
-            self.start_frame, self.starts = read_start_players(self.session, self.rig)
+            self.start_frame, self.starts = await in_thread(
+                read_start_players, self.session, self.rig, says="reading the players"
+            )
             self.choice.set_options(list(self.players), value=self.player)
             self.show()
 

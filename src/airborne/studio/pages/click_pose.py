@@ -166,7 +166,7 @@ class ClickPanel(PointsPanel):
         if not self.clicked.names:
             return
         frame = self.frame
-        solved = await self.latest.do(fit_clicks, self.model, self.rig, self.clicked)
+        solved = await self.latest.do("fitting the body", fit_clicks, self.model, self.rig, self.clicked)
         if solved is not None and not self.is_by_hand and frame == self.frame:  # set, or gone on, since
             pose, self.says = solved
             self.hand.place(pose)

@@ -62,7 +62,7 @@ class CommandWatch:
     async def stop(self) -> None:
         """Stop it."""
         if self.command is not None:
-            await in_thread(self.command.stop)
+            await in_thread(self.command.stop, says="stopping")
 
     async def look(self) -> None:
         """Say how it goes, or what came of it."""

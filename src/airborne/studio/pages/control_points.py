@@ -107,7 +107,7 @@ class ControlPointsPanel(PointsPanel):
             if px is None or count_clicked(self.clicked, camera) < FEWEST_POINTS:
                 self.fits.pop(camera, None)
             elif self.fits.get(camera, (b"",))[0] != px.tobytes():
-                fit = await self.latest.do(_fit, self.clicked, camera, self.shown.sizes)
+                fit = await self.latest.do("solving the camera", _fit, self.clicked, camera, self.shown.sizes)
                 if fit is None:
                     return
                 self.fits[camera] = px.tobytes(), fit

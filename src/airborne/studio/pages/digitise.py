@@ -56,7 +56,7 @@ async def digitise_page(session: Session) -> None:
         if shown is None:
             return
         try:
-            model = await in_thread(session.project().model)
+            model = await in_thread(session.project().model, says="reading the body")
         except AirborneError:  # points can be digitised before there is a body
             model = None
         with errors_shown():
@@ -194,7 +194,7 @@ class DigitisePanel(PointsPanel):
     async def set_help(self, is_on: bool) -> None:
         """Show the epipolar curves of the chosen point's clicks, or no more; that it was on is noted for good."""
         with errors_shown():
-            self.rig = await in_thread(self.session.rig) if is_on else None
+            self.rig = await in_thread(self.session.rig, says="calibrating the cameras") if is_on else None
             if is_on:
                 self.session.edit(self.who.record, record_text(self.who), "epipolar help used")
         self.show()

@@ -37,7 +37,7 @@ async def first_pose_page(session: Session) -> None:
             await _build_either(players, FindPlayersPanel(session, shown, rig, frame), changed)
             return
         try:
-            model = await in_thread(project.model)
+            model = await in_thread(project.model, says="reading the body")
         except AirborneError as error:
             complain(error)
             return

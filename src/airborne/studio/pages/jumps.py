@@ -34,7 +34,7 @@ class Jumps:
         """Jump among the frames of this run from now on."""
         self._run = run
         with errors_shown():
-            for what, frames in (await in_thread(doubtful_frames, run)).items():
+            for what, frames in (await in_thread(doubtful_frames, run, says="reading the run")).items():
                 self._buttons[what].set_enabled(len(frames) > 0)
 
     async def press(self, event: KeyEventArguments) -> None:
@@ -48,7 +48,7 @@ class Jumps:
         if self._run is None:
             return
         with errors_shown():
-            frames = (await in_thread(doubtful_frames, self._run))[what]
+            frames = (await in_thread(doubtful_frames, self._run, says="reading the run"))[what]
             if not len(frames):
                 complain(f"in no frame of this run is anything {what}")
                 return

@@ -15,6 +15,7 @@ from airborne.studio.project import steps
 from airborne.studio.session import Session
 
 _T = TypeVar("_T")
+_SILENT_S = 0.1  # a wait that is not announced: shorter ones are not felt as such
 _LOOK_EVERY_S = 1.0  # for changes by other windows and other programs
 _BLUE = "#0072b2"  # of buttons: dark enough for white letters
 _GREEN = "#007a5a"  # of good news, likewise
@@ -196,17 +197,42 @@ def complain(error: AirborneError | str) -> None:
     ui.notify(str(error), type="warning", multi_line=True, timeout=10_000, close_button="Close", **own)
 
 
-async def in_thread(function: Callable[..., _T], *arguments: object) -> _T:
-    """Do something that takes time without holding up other windows; what asked ends here if its own is closed."""
+async def in_thread(function: Callable[..., _T], *arguments: object, says: str = "reading") -> _T:
+    """Do something that takes time without holding up other windows; what asked ends here if its own is closed.
+
+    Where it takes longer than a tenth of a second, a note says what is done until it ends; none where nobody waits
+    for it, and `says` is empty.
+    """
     try:
         client = ui.context.client
     except RuntimeError:  # it was closed while this waited for its turn
         raise asyncio.CancelledError from None
     try:
-        return cast(_T, await run.io_bound(function, *arguments))
+        with _announced(client, says):
+            return cast(_T, await run.io_bound(function, *arguments))
     finally:
         if client.id not in Client.instances or app.is_stopping:  # it would get None
             raise asyncio.CancelledError
+
+
+@contextmanager
+def _announced(client: Client, says: str) -> Iterator[None]:
+    """Say on a page what goes on, once it has taken a tenth of a second."""
+    notes: list[ui.notification] = []
+
+    def announce() -> None:
+        if says and client.id in Client.instances:
+            with client:
+                notes.append(ui.notification(f"{says} …", spinner=True, timeout=None, type="ongoing"))
+
+    soon = asyncio.get_running_loop().call_later(_SILENT_S, announce)
+    try:
+        yield
+    finally:
+        soon.cancel()
+        for note in notes:
+            if client.id in Client.instances:
+                note.dismiss()
 
 
 class Latest:
@@ -216,22 +242,17 @@ class Latest:
         """Begin with nothing asked for."""
         self._lock, self._asked = asyncio.Lock(), 0
 
-    async def do(self, function: Callable[..., _T], *arguments: object) -> _T | None:
-        """Do something in a thread; None where something else was asked for meanwhile."""
+    async def do(self, says: str, function: Callable[..., _T], *arguments: object) -> _T | None:
+        """Do something in a thread, as `in_thread` does; None where something else was asked for meanwhile."""
         self._asked += 1
         asked = self._asked
         async with self._lock:
-            result = await in_thread(function, *arguments) if asked == self._asked else None
+            result = await in_thread(function, *arguments, says=says) if asked == self._asked else None
         return result if asked == self._asked else None
 
 
 async def work(what: str, function: Callable[[], _T]) -> _T | None:
     """Do something slow in a thread, saying what; None where it ends in an error, which is shown."""
-    note = ui.notification(what, spinner=True, timeout=None, type="ongoing")
-    try:
-        result = await in_thread(function)
-    except AirborneError as error:
-        complain(error)
-        result = None
-    note.dismiss()
-    return result
+    with errors_shown():
+        return await in_thread(function, says=what)
+    return None

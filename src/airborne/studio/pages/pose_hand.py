@@ -64,7 +64,7 @@ class PoseHand:
         On the way it is shown, and where the drag has ended it is the panel's to show.
         """
         async with self._one_at_a_time:
-            did_move, drawn = await in_thread(self._move, drag)
+            did_move, drawn = await in_thread(self._move, drag, says="")
         view.follow(drag, *drawn)
         return did_move
 

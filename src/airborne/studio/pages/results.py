@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from nicegui import ui
@@ -12,7 +12,7 @@ from airborne.errors import ResultError, count
 from airborne.export.methods_text import describe_methods
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
-from airborne.studio.pages.layout import name_outer_links, page_frame
+from airborne.studio.pages.layout import in_thread, name_outer_links, page_frame
 from airborne.studio.pages.make_files import Making
 from airborne.studio.project import list_outer_runs, list_runs
 from airborne.studio.session import Session
@@ -37,25 +37,40 @@ async def results_page(session: Session) -> None:
         if not runs:
             ui.label("There is no run yet; see the step Track.").classes("warn")
         for each in runs:
+            found = await in_thread(_read_run, each, says=f"reading {each.name}")
             with ui.element("div").classes("card"):
-                _run_card(session, each)
+                _run_card(session, each, found)
 
 
-def _run_card(session: Session, folder: Path) -> None:
+class _Found(NamedTuple):
+    """What a run's folder holds."""
+
+    note: str | None  # where it is not finished
+    summary: dict[str, Any] | ResultError | None  # None where it is not finished
+    tables: list[str]
+
+
+def _read_run(folder: Path) -> _Found:
+    note, tables = note_if_unfinished(folder), list_tables(folder)
+    try:
+        return _Found(note, None if note else read_summary(folder), tables)
+    except ResultError as error:
+        return _Found(note, error, tables)
+
+
+def _run_card(session: Session, folder: Path, found: _Found) -> None:
     ui.label(folder.name).classes("name")
-    note = note_if_unfinished(folder)
-    if note is not None:
-        ui.label(note).classes("warn small")
+    if found.note is not None:
+        ui.label(found.note).classes("warn small")
     if (folder / REPORT).is_file():
         _link(folder, REPORT, "Open the report")
-    if note is None:
-        try:
-            _numbers(read_summary(folder))
-        except ResultError as error:
-            ui.label(str(error)).classes("bad small")
+    if isinstance(found.summary, ResultError):
+        ui.label(str(found.summary)).classes("bad small")
+    elif found.summary is not None:
+        _numbers(found.summary)
     ui.label("Tables").classes("soft")
     with ui.element("div").classes("row-line"):
-        for name in list_tables(folder):
+        for name in found.tables:
             _link(folder, name, name)
     Making(session, folder)
 

@@ -96,7 +96,7 @@ async def _show_run(
     bodies: list[Callable[[int], Any]] = []
     correction = None if holds_players(folder) else Correction(session, shown, folder)
     with errors_shown():
-        summary = await in_thread(read_summary, folder) if (folder / SUMMARY).is_file() else {}
+        summary = await in_thread(read_summary, folder, says="reading the run") if (folder / SUMMARY).is_file() else {}
         for finding in summary.get("self_check") or []:
             if finding["is_alarm"]:
                 ui.label(finding["sentence"]).classes("bad small")
@@ -105,7 +105,7 @@ async def _show_run(
         if correction is not None:
             correction.build()
             bodies.append(correction.turn_to)
-        kinds = await in_thread(curve_kinds, folder)
+        kinds = await in_thread(curve_kinds, folder, says="reading the run")
         kind = ui.select(kinds, label="curves", value="", on_change=lambda: curves.show(address + quote(kind.value)))
         kind.props("outlined dense options-dense").style("min-width: 180px")
         kind.set_visibility(len(kinds) > 1)
@@ -122,7 +122,9 @@ async def _show_run(
         with ui.element("div").classes("row-line small"), errors_shown():
             ui.element("span").style(f"width: 16px; border-top: 3px solid {BESIDE_COLOUR}")
             ui.label(beside).classes("name")
-            ui.label(await in_thread(describe_distance, folder, session.folder / beside)).classes("soft")
+            ui.label(
+                await in_thread(describe_distance, folder, session.folder / beside, says="comparing the runs")
+            ).classes("soft")
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
             view = CameraViews(
@@ -144,8 +146,8 @@ async def _show_run(
 
 async def _stage(folder: Path, view: CameraViews) -> list[Callable[[int], None]]:
     """Build the scene of a run of one body; return what shows a frame in it."""
-    rows = await in_thread(run_rows, folder)
-    model = await in_thread(run_body, folder)
+    rows = await in_thread(run_rows, folder, says="reading the run")
+    model = await in_thread(run_body, folder, says="reading the run")
     path, reach_m = rows.position[np.isfinite(rows.position).all(axis=1)], reach_of(model)
     around = overview(np.vstack([path - reach_m, path + reach_m])) if len(path) else None
     scene = draw_cameras(run_rig(folder), rows.position, seen_from=around)
@@ -169,7 +171,7 @@ class MomentumArrow:
 
     async def _read(self) -> None:
         with errors_shown():
-            self._momenta = await in_thread(run_momenta, self._folder)
+            self._momenta = await in_thread(run_momenta, self._folder, says="reading the run")
             self.show(self._view.frame)
 
     def show(self, frame: int) -> None:

@@ -71,7 +71,7 @@ class ThingPanel:
         """Give the chosen solid the colour that a picture has there."""
         number = int(self.shown.clock.images[self.view.frame, pane])
         with errors_shown():
-            image = await in_thread(self.session.pictures.image, self.shown.sources[pane], number)
+            image = await in_thread(self.session.pictures.image, self.shown.sources[pane], number, says="decoding")
             if image is not None:
                 self.change(colour=colour_at(image, u, v))
                 self.form.refresh()

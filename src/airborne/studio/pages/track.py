@@ -137,7 +137,7 @@ class _Panel:
     async def stop(self) -> None:
         """Stop the run; its frames stay."""
         if self._command is not None:
-            await in_thread(self._command.stop)
+            await in_thread(self._command.stop, says="stopping")
         self._show_buttons()
 
     async def look(self, *, anew: bool = False) -> None:
@@ -145,7 +145,7 @@ class _Panel:
         if anew:
             self.view.set_overlay(self._overlay)
             self._show_buttons()
-        n_done, newest = await in_thread(self._count)
+        n_done, newest = await in_thread(self._count, says="")
         command = self._command
         if command is not None and command.is_running:
             self._say_progress(command, n_done)

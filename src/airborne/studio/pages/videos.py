@@ -57,7 +57,7 @@ async def videos_page(session: Session) -> None:
         choices: list[_Choice] = []
         with ui.element("div").classes("files"):
             for path in files:
-                facts = await in_thread(_facts, path)
+                facts = await in_thread(_facts, path, says=f"looking at {path.name}")
                 choices.append(_choose(project, path, facts))
                 _card(choices[-1], facts)
         with ui.element("div").classes("row-line"):
