@@ -33,6 +33,10 @@ def test_all_of_it_shows_one_frame(report):
     path, motion = report
     with open_file(path) as page:
         view = page.locator("#viewer")
+        x, sd = motion.position[0, 0], motion.position_sd[0, 0]
+        says = page.locator("#viewer .curves").get_attribute("aria-description")
+        value, _, spread, unit = says.split(",")[0].removeprefix("x ").split()
+        assert (float(value), float(spread), unit) == (pytest.approx(x, abs=sd / 10), pytest.approx(sd, rel=0.1), "m")
         assert view.is_visible() and view.get_attribute("data-frame") == str(motion.index[0])
         before = page.locator(".in-3d").screenshot()
         last = int(motion.index[-1])

@@ -25,6 +25,7 @@ from airborne.studio.calibrating import (
     list_boards,
     list_pictures,
     list_wands,
+    read_deviations,
     read_findings,
     read_report,
     sources_text,
@@ -32,6 +33,7 @@ from airborne.studio.calibrating import (
     write_report,
 )
 from airborne.studio.clicks import read_clicked
+from airborne.studio.pages.cameras import _describe
 from airborne.studio.project import find_trial, read_project
 
 TRIAL = '[[camera]]\nname = "left"\nvideo = "a.mp4"\n[[camera]]\nname = "right"\nvideo = "b.mp4"\ncalibrated_as = "R"\n'
@@ -126,6 +128,21 @@ def test_what_a_diagnosis_found_is_told_by_camera(tmp_path):
     (tmp_path / "calib_report" / "report.json").write_text("[]")
     with pytest.raises(TrialError, match="no report of a calibration"):
         read_findings(tmp_path, "calib.toml")
+
+
+def test_a_camera_s_place_and_focal_length_have_the_deviations_of_its_report(tmp_path):
+    assert read_deviations(tmp_path, "calib.toml") == {}
+    (tmp_path / "calib_report").mkdir()
+    sd = {"x_m": 0.0123, "z_m": 0.004, "fx_px": 2.5}
+    text = json.dumps({"cameras": {"a": {"sd": sd}, "b": {"sd": {}}}, "findings": []})
+    (tmp_path / "calib_report" / "report.json").write_text(text)
+    known = read_deviations(tmp_path, "calib.toml")
+    assert known == {"a": sd, "b": {}}
+    camera = camera_looking_at("a", [3, -2, 1.5], [0, 0, 1], focal_px=700, size=(640, 480))
+    assert _describe(camera, known["a"]) == (
+        "at 3.000 ± 0.012, -2.00, 1.5000 ± 0.0040 m; focal length 700.0 ± 2.5 px; 640×480 px"
+    )
+    assert _describe(camera, known["b"]) == "at 3.00, -2.00, 1.50 m; focal length 700 px; 640×480 px"
 
 
 def test_what_a_calibration_said_is_kept_in_the_folder_only(tmp_path):

@@ -48,6 +48,22 @@ def test_frames_are_in_doubt_where_any_joint_or_player_is(folder):
     assert len(players["lost"]) == 0
 
 
+THINNED = """async (now) => {
+    const { drawCurves } = await import("/parts/curves.js"), canvas = document.querySelector("canvas.curves");
+    const series = [{ name: "x", unit: "m", value: [1, 1.25, 2, 2.5], sd: [0.05, 0.05, null, null] }];
+    const status = Array(4).fill("tracked");
+    drawCurves(canvas, { is_thinned: true, frame: [0, 50, 100, 150], time_s: [0, 1, 2, 3], status, series }, now);
+    return canvas.getAttribute("aria-description");
+}"""
+
+
+def test_of_frames_that_share_a_point_the_cursor_says_the_least_and_the_greatest(folder):
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/review?")) as page:
+        page.wait_for_selector("canvas.curves[aria-description]")
+        found = [page.evaluate(THINNED, now) for now in (0, 70, 120)]
+    assert found == ["x 1.000 to 1.250 ± 0.050 m"] * 2 + ["x 2.000 to 2.500 ± ? m"]
+
+
 def test_keys_go_to_the_next_frame_in_doubt_and_back(folder):
     with fork_studio(folder) as address, open_page(address.replace("/?", "/review?")) as page:
         for run, ways in (
@@ -61,5 +77,8 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back(folder):
             for key, frame in ways:
                 page.keyboard.press(key)
                 wait_for_frame(page, frame)
+            if run == "person":
+                says = "x 0.0450 ± 0.0032 m, y 0.0000 ± 0.0032 m, z 1.0000 ± 0.0032 m"
+                page.locator(f'canvas.curves[aria-description="{says}"]').wait_for()
         assert page.get_by_role("button", name="next uncertain").is_enabled()
         assert not page.get_by_role("button", name="next lost").is_enabled()

@@ -56,10 +56,12 @@ def test_two_events_give_the_offset_and_its_deviation(folder):
             page.get_by_text(f"second: picture {second},").wait_for()
             page.get_by_text(f"first, the clock: picture {first},").wait_for()
             page.keyboard.press("e")
-        page.get_by_text("2 events: -200.0 ms, sd 9.1 ms").wait_for()
+        page.get_by_text("2 events: -200.0 ± 9.1 ms").wait_for()
         page.get_by_role("button", name="Use this offset").click()
         page.get_by_text("written: offset of second: -200.0 ms").wait_for()
         by_hand = read_toml(folder / "trial.toml")["camera"][1]
+        page.reload()
+        page.get_by_text("The trial has -200.0 ± 9.1 ms for second.").wait_for()
         page.get_by_label("from").click()
         page.get_by_role("option", name="a flash").click()
         page.get_by_role("button", name="Find the offsets").click()

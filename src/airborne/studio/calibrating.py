@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -113,16 +114,32 @@ def read_report(folder: Path) -> str:
 
 def read_findings(folder: Path, file: str) -> dict[str, list[str]]:
     """Return what the diagnosis of a calibration found, by camera, "" for all. Raises TrialError."""
-    path, found = folder / f"{Path(file).stem}_report" / "report.json", defaultdict(list)
-    if not path.is_file() or not is_inside(folder, path):
-        return found
-    try:
-        for each in read_json(path)["findings"]:
+    found = defaultdict(list)
+    with _report_of(folder, file) as report:
+        for each in report.get("findings", ()):
             for camera in each["cameras"] or [""]:
                 found[str(camera)].append(str(each["sentence"]))
-    except (OSError, ValueError, KeyError, TypeError):
-        raise TrialError(f"{path} is no report of a calibration; calibrate again, or remove it") from None
     return found
+
+
+def read_deviations(folder: Path, file: str) -> dict[str, dict[str, float]]:
+    """Return the standard deviations that a calibration's report knows, by camera and number. Raises TrialError."""
+    with _report_of(folder, file) as report:
+        return {
+            str(name): {str(number): float(sd) for number, sd in camera["sd"].items()}
+            for name, camera in report.get("cameras", {}).items()
+        }
+    return {}
+
+
+@contextmanager
+def _report_of(folder: Path, file: str) -> Iterator[dict[str, Any]]:
+    """Give the report beside a calibration, empty where there is none; raises TrialError where it is no such thing."""
+    path = folder / f"{Path(file).stem}_report" / "report.json"
+    try:
+        yield read_json(path) if path.is_file() and is_inside(folder, path) else {}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        raise TrialError(f"{path} is no report of a calibration; calibrate again, or remove it") from None
 
 
 def write_report(folder: Path, text: str) -> None:

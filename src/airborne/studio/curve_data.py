@@ -57,8 +57,9 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
         if what:
             names, unit, values, sd = _read_series(run, what, index)
     strips, ranks = run_strips(run)
+    is_thinned = len(index) > _MOST_POINTS
     worst = ranks_of(status).max(axis=1, initial=0)
-    if len(index) > _MOST_POINTS:
+    if is_thinned:
         starts = np.arange(0, len(index), -(-2 * len(index) // _MOST_POINTS))
         middles = np.append((starts[:-1] + starts[1:]) // 2, len(index) - 1)
         ends = [np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)]
@@ -67,6 +68,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
         sd, worst = np.fmax.reduceat(sd, starts).repeat(2, axis=0), np.maximum.reduceat(worst, starts).repeat(2)
         ranks = np.maximum.reduceat(ranks, starts).repeat(2, axis=0)
     return {
+        "is_thinned": is_thinned,
         "frame": index.tolist(),
         "time_s": time_s.tolist(),
         "status": FROM_GOOD[worst].tolist(),

@@ -1,10 +1,11 @@
 // Curves over time with bands of two standard deviations, and a strip that says how each frame went; one cursor.
-const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#8a6d00"];
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#6600cc"];
 const RANKS = ["tracked", "uncertain", "unknown", "lost"]; // of a joint: unknown is what no picture shows
-const STATUS = { tracked: "#009e73", uncertain: "#e69f00", unknown: "#d55e00", lost: "#d55e00" };
-const STRIP = 12, ROW = 10, LEGIBLE = 8, MOST_NAMES = 6, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, FONT = "11px system-ui, sans-serif";
+const STATUS = { tracked: "#009e73", uncertain: "#e69f00", unknown: "#5d666f", lost: "#d55e00" };
+const STRIP = 12, ROW = 10, LEGIBLE = 8, MOST_NAMES = 6, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, STEP = 16, FONT = "11px system-ui, sans-serif";
 
-// data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. What another run has,
+// data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. {is_thinned}: two rows in a
+// row hold the least and the greatest of the frames from the first's to the next but one. What another run has,
 // {beside: {frame, series}}, is drawn with dashes. {strips: [{name, rank}]}: how each joint or player went, a digit a frame.
 export function drawCurves(canvas, data, now) {
   const box = boxOf(canvas), ratio = (window.devicePixelRatio || 1) * box.zoom;
@@ -34,6 +35,7 @@ export function drawCurves(canvas, data, now) {
   pen.fillStyle = "#5d666f";
   pen.font = FONT;
   pen.fillText(`frame ${now}${time}`, LEFT, box.height - 4);
+  drawLegend(pen, data.series, data.series.map((each) => valueAt(each, data, now)), canvas);
 }
 
 function drawStill(pen, box, data) {
@@ -70,8 +72,6 @@ function drawStill(pen, box, data) {
     pen.textAlign = "right";
     pen.fillText(each.name.replaceAll("_", " "), LEFT - 6, top + (k + 1) * thick - 2, LEFT - 8);
   });
-  pen.font = FONT;
-  drawLegend(pen, series);
 }
 
 // Which joints or players are worse than tracked in a row, where not all of them are.
@@ -148,14 +148,26 @@ function drawCurve(pen, { value, sd }, colour, frame, x, y) {
   pen.lineWidth = 1;
 }
 
-function drawLegend(pen, series) {
+// What a curve is at the cursor, ± its standard deviation; of frames that share a point, from the least to the greatest.
+function valueAt({ value, sd, unit }, { frame, is_thinned }, now) {
+  const row = is_thinned ? 2 * Math.floor(frame.findLastIndex((each) => each <= now) / 2) : frame.indexOf(now);
+  const ends = [...new Set([value[row], value[row + (is_thinned ? 1 : 0)]])];
+  if (ends.some((each) => each === null || each === undefined)) return "";
+  const has = sd && sd.length, of = has && sd[row];
+  const digits = of ? Math.max(0, Math.min(5, 1 - Math.floor(Math.log10(of)))) : 3; // two of the deviation count
+  const spread = has ? ` ± ${of === null ? "?" : of.toFixed(digits)}` : "";
+  return `${ends.map((each) => each.toFixed(digits)).join(" to ")}${spread} ${unit}`;
+}
+
+function drawLegend(pen, series, values, canvas) {
   let left = LEFT;
-  pen.textAlign = "left";
-  series.forEach((each, k) => {
+  const texts = series.map(({ name }, k) => (values[k] ? `${name} ${values[k]}` : name));
+  series.forEach((_, k) => {
     pen.fillStyle = COLOURS[k % COLOURS.length];
     pen.fillRect(left, 8, 12, 3);
     pen.fillStyle = "#1f2429";
-    pen.fillText(each.name, left + 16, 13);
-    left += 28 + pen.measureText(each.name).width;
+    pen.fillText(texts[k], left + 16, 13);
+    left += 28 + STEP * Math.ceil(pen.measureText(texts[k]).width / STEP); // or they would tremble as they change
   });
+  canvas.setAttribute("aria-description", texts.join(", "));
 }

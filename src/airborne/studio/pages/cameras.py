@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from nicegui import ui
 
 from airborne.calibration.sources.court import Net
-from airborne.cameras import Rig
+from airborne.cameras import Camera, Rig
 from airborne.errors import count
-from airborne.studio.calibrating import NETS, court_text, read_findings
+from airborne.studio.calibrating import NETS, court_text, read_deviations, read_findings
 from airborne.studio.calibrations import ENDINGS, Calibrations, list_calibrations
 from airborne.studio.clicks import list_surveys
 from airborne.studio.folder import outer_files
@@ -68,7 +69,7 @@ async def cameras_page(session: Session) -> None:
         elif table.get("file"):
             rig = await work("reading the calibration", session.rig)
             if rig is not None:
-                _show_rig(rig, _findings_of(session, str(table["file"])))
+                _show_rig(rig, _findings_of(session, str(table["file"])), _deviations_of(session, str(table["file"])))
 
 
 def _chooser(session: Session, files: Calibrations, surveys: list[str], names_form: CameraNames) -> None:
@@ -123,17 +124,36 @@ def _findings_of(session: Session, file: str) -> dict[str, list[str]]:
     return {"": found.get("", []), **own}
 
 
-def _show_rig(rig: Rig, findings: Mapping[str, Sequence[str]]) -> None:
+def _deviations_of(session: Session, file: str) -> dict[str, dict[str, float]]:
+    """Return the standard deviations that a calibration's report knows, by the trial's own cameras."""
+    known: dict[str, dict[str, float]] = {}
+    with errors_shown():
+        known = read_deviations(session.folder, file)
+    return {each.name: known.get(each.calibrated_as or each.name, {}) for each in session.project().cameras}
+
+
+def _describe(camera: Camera, sd: Mapping[str, float]) -> str:
+    """Say where a camera is, and its focal length, each ± its standard deviation where that is known."""
+    place = ", ".join(_with_sd(at, sd.get(f"{axis}_m"), 2) for axis, at in zip("xyz", camera.centre, strict=True))
+    focal = _with_sd(camera.K[0, 0], sd.get("fx_px"), 0)
+    return f"at {place} m; focal length {focal} px; {camera.size[0]}×{camera.size[1]} px"
+
+
+def _with_sd(value: float, sd: float | None, digits: int) -> str:
+    """Write a number, with two digits of its standard deviation."""
+    if not sd:
+        return f"{value:.{digits}f}"
+    digits = max(0, 1 - math.floor(math.log10(sd)))
+    return f"{value:.{digits}f} ± {sd:.{digits}f}"
+
+
+def _show_rig(rig: Rig, findings: Mapping[str, Sequence[str]], deviations: Mapping[str, Mapping[str, float]]) -> None:
     with ui.element("div").classes("split"):
         with ui.element("div").classes("wide"):
             draw_cameras(rig)
         with ui.element("div").classes("side"), ui.element("div").classes("card"):
             show_findings(findings.get("", ()))
             for camera in rig:
-                x, y, z = camera.centre
                 ui.label(camera.name).classes("name")
-                ui.label(
-                    f"at {x:.2f}, {y:.2f}, {z:.2f} m; focal length {camera.K[0, 0]:.0f} px; "
-                    f"{camera.size[0]}×{camera.size[1]} px"
-                ).classes("soft small")
+                ui.label(_describe(camera, deviations.get(camera.name, {}))).classes("soft small")
                 show_findings(findings.get(camera.name, ()))

@@ -18,7 +18,7 @@ _T = TypeVar("_T")
 _SILENT_S = 0.1  # a wait that is not announced: shorter ones are not felt as such
 _LOOK_EVERY_S = 1.0  # for changes by other windows and other programs
 _BLUE = "#0072b2"  # of buttons: dark enough for white letters
-_GREEN = "#007a5a"  # of good news, likewise
+_GREEN = "#006b3c"  # of good news, likewise
 _STEP_OF = {"camera": "Videos", "calibration": "Cameras", "body": "Body"}  # where each table is written
 _KEYS = {
     "← →": "one frame back or on; with Shift ten",

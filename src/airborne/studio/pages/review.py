@@ -27,7 +27,7 @@ from airborne.studio.stage import Arrow, BodyOnStage, draw_cameras, overview, re
 from airborne.studio.view import CameraViews, Curves
 
 _MOMENTUM_COLOUR, _LONGEST_M = "#d55e00", 1.0  # its arrow's length where it is greatest in the run
-_HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations."
+_HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations, numbers ± one."
 
 
 async def review_page(session: Session) -> None:

@@ -168,11 +168,12 @@ class _Panel:
                 self.labels[side].set_text(text)
         self.use.set_visibility(bool(self.events))
         if not self.events:
-            present = self.session.project().cameras[self.other].offset_s
-            self.says.set_text(f"The trial has {1e3 * present:+.1f} ms for {self.shown.names[self.other]}.")
+            camera = self.session.project().cameras[self.other]
+            sd = f" ± {1e3 * camera.offset_sd_s:.1f}" if camera.offset_sd_s else ""  # 0 where nobody estimated it
+            self.says.set_text(f"The trial has {1e3 * camera.offset_s:+.1f}{sd} ms for {camera.name}.")
             return
         offset_s, sd_s = self.offset()
-        text = f"{count(len(self.events), 'event')}: {1e3 * offset_s:+.1f} ms, sd {1e3 * sd_s:.1f} ms"
+        text = f"{count(len(self.events), 'event')}: {1e3 * offset_s:+.1f} ± {1e3 * sd_s:.1f} ms"
         self.says.set_text(text)
 
     def start(self, way: str) -> None:
