@@ -15,18 +15,19 @@ from airborne.errors import TrialError
 from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import errors_shown, in_thread
 from airborne.studio.pages.mask_cameras import MaskPanel
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.pictures import ShownTrial
-from airborne.studio.runs import run_body, run_rig, run_rows
+from airborne.studio.runs import count_rows, run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_clicks, with_key
-from airborne.studio.view import CameraViews, Drag, Mark
+from airborne.studio.view import CameraViews, Curves, Drag, Mark
 from airborne.trial.keys import KeyTable
 from airborne.trial.settings import KEY_METHODS
 from airborne.types import Array
 
+_LOOK_EVERY_S = 1.0  # at a run that is tracked again
 _JOINT_COLOUR, _CLICK_COLOUR = "#ffffff", "#f0e442"
 
 
@@ -37,6 +38,8 @@ class Correction:
         """Begin with nothing to grab, until the switch is on."""
         self.session, self.shown, self.folder = session, shown, folder
         self.view: CameraViews | None = None
+        self.curves: Curves | None = None
+        self._n_rows = count_rows(folder)[0]  # that are shown
         cameras = run_rig(folder).select(shown.names).cameras
         self.hand = PoseHand(run_body(folder), cameras, lambda pose: self._marks(pose, {}))
         self._seen = self._tracked = self._held()  # when this window looked last; when it last tracked
@@ -60,6 +63,20 @@ class Correction:
             self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking")
             self.watch.buttons = [self.again]
         self.again.set_visibility(False)
+        ui.timer(_LOOK_EVERY_S, self.look)
+
+    async def look(self) -> None:
+        """Show what the run has tracked again since, while it goes on."""
+        if self.watch.is_running:
+            n_rows, _ = await in_thread(count_rows, self.folder, says="")
+            if n_rows != self._n_rows:
+                self._n_rows = n_rows
+                self._refresh()
+
+    def _refresh(self) -> None:
+        if self.view is not None and self.curves is not None:
+            self.view.run_method("refresh")
+            self.curves.run_method("load")
 
     async def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""
@@ -159,8 +176,7 @@ class Correction:
     async def show_anew(self, command: Command) -> None:
         """Show what came of it."""
         self.watch.says.set_text("tracked again")
-        if self.view is not None:
-            self.view.run_method("refresh")
+        self._refresh()
         await self.turn_to(self.frame)
 
     def _clicks_of_key(self, frame: int) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager, contextmanager
 from typing import Any, TypeVar, cast
 
 from nicegui import Client, app, run, ui
+from nicegui.events import KeyEventArguments
 
 from airborne.errors import AirborneError
 from airborne.studio.guide import next_task
@@ -36,10 +37,21 @@ _KEYS = {
     "R": "the next frame in which one of them is lost, or a joint is in no picture; with Shift the one before",
     "E": "both pictures show the same event, where cameras are synchronised by hand",
     "N P": "choose the next point, the one before",
+    "Delete": "remove the chosen click",
+    "Ctrl+Enter": "press the page's blue button: Use, Track, Track again; of several cards that in which the cursor is",
     "Esc": "let go of the chosen mark",
     "Ctrl+Z, Ctrl+Y": "undo, redo",
     "?": "this sheet",
 }
+
+_PRESS_BLUE = """(() => { // the last that is there, as Use comes after Find; a button in focus hears Enter itself
+    const here = document.activeElement, card = here.closest(".card");
+    const blue = [...document.querySelectorAll(".main .q-btn--unelevated.bg-primary:not(.disabled)")];
+    const seen = blue.filter((each) => each.checkVisibility()), near = seen.filter((each) => card?.contains(each));
+    const cards = new Set(seen.map((each) => each.closest(".card")));
+    const button = near.at(-1) || (cards.size === 1 && seen.at(-1));
+    if (button && here.tagName !== "BUTTON") button.click();
+})()"""
 
 
 @asynccontextmanager
@@ -95,6 +107,7 @@ async def page_frame(
             rail()
         ui.timer(_LOOK_EVERY_S, look)
         ui.keyboard(on_key=lambda event: _key(event, sheet, move), ignore=["input", "select", "textarea"])
+        ui.keyboard(on_key=_enter, ignore=[])  # in a field too
         with ui.element("div").classes("main" if scrolls else "main still"):  # the page has a <main> already
             ui.html(f"<h1>{title}</h1>", sanitize=False)
             if text:
@@ -113,6 +126,11 @@ async def _key(event, sheet: ui.dialog, move: Callable[[str], Awaitable[None]]) 
         sheet.open()
     elif event.modifiers.ctrl and event.key in ("z", "y"):
         await move("undo" if event.key == "z" else "redo")
+
+
+def _enter(event: KeyEventArguments) -> None:
+    if event.action.keydown and not event.action.repeat and event.modifiers.ctrl and event.key == "Enter":
+        ui.run_javascript(_PRESS_BLUE)
 
 
 def _rail(session: Session, here: str) -> None:

@@ -57,7 +57,7 @@ class PointsPanel:
 
     def build_views(self, frame: int, on_drag: Callable[[Drag], Any] | None = None) -> None:
         """Lay out the pictures; keys choose points."""
-        ui.keyboard(on_key=self.step)
+        ui.keyboard(on_key=self.press, ignore=["input", "select", "textarea"])
         self.view = CameraViews(
             self.shown,
             frame=frame,
@@ -109,10 +109,12 @@ class PointsPanel:
         self.chosen, self.selected = name, None
         self.show()
 
-    async def step(self, event: KeyEventArguments) -> None:
-        """Choose the next point, or the one before."""
+    async def press(self, event: KeyEventArguments) -> None:
+        """Choose the next point by key, or the one before; or remove the chosen click."""
         if event.action.keydown and event.key in ("n", "p") and self.names:
             await self.choose(self.after(self.chosen, 1 if event.key == "n" else -1))
+        elif event.action.keydown and event.key == "Delete" and self.selected is not None:
+            await self.remove()
 
     def after(self, name: str, n: int) -> str:
         """Return the point n places after another; the first follows the last."""

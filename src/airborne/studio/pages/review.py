@@ -141,6 +141,8 @@ async def _show_run(
                 correction.build_watch()
                 bodies += await _stage(folder, view)
     curves = Curves(address, frame=frame)
+    if correction is not None:
+        correction.curves = curves
     return view, correction
 
 

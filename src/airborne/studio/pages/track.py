@@ -14,6 +14,7 @@ from airborne.motion.run_folder import MOTION, SUMMARY
 from airborne.studio.commands import Command
 from airborne.studio.folder import is_inside, outer_links
 from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
+from airborne.studio.pages.track_settings import TrackSettingsBar
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import find_run, list_runs
 from airborne.studio.runs import count_rows
@@ -23,31 +24,29 @@ from airborne.studio.view import CameraViews, Curves
 _LOOK_EVERY_S = 1.0  # at a run that goes on
 _HELP = (
     "Tracking runs in a process of its own: go on working, or close the browser. "
-    "A run that is stopped keeps its frames and goes on where it was."
+    "A run that is stopped keeps its frames and goes on where it was. To try another method, name another folder."
 )
 
 
 async def track_page(session: Session) -> None:
     """Start, watch, stop and resume a run."""
-    async with page_frame(session, "Track", "Follow the body", _HELP):
+    async with page_frame(session, "Track", "Follow the body", _HELP) as changed:
         if name_missing_steps(session, "camera", "calibration", "body"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:
             return
         try:
-            n_frames = _n_frames(session, len(shown.clock))
+            settings = TrackSettingsBar(session, len(shown.clock))
         except AirborneError as error:
             complain(error)
             return
-        _Panel(session, shown, n_frames).build()
+        _Panel(session, shown, settings).build()
 
+        async def reread() -> None:
+            settings.reread()
 
-def _n_frames(session: Session, n_images: int) -> int:
-    """Return how many frames are tracked; the trial is checked on the way."""
-    trial = session.project().trial()
-    stop = n_images if trial.track.stop is None else min(n_images, trial.track.stop)
-    return len(range(trial.start.frame, stop, trial.track.every))
+        changed.append(reread)
 
 
 @dataclass(eq=False)
@@ -56,7 +55,7 @@ class _Panel:
 
     session: Session
     shown: ShownTrial
-    n_frames: int
+    settings: TrackSettingsBar
     n_done: int = -1  # frames of the run, when it was looked at last
     n_before: int = 0  # of them, when it was resumed
     ended: Command | None = None  # the run whose end was told
@@ -71,6 +70,7 @@ class _Panel:
         with ui.element("div").classes("row-line"):
             self.name = ui.input("folder of the run", value=name, on_change=lambda: self.look(anew=True))
             self.name.props("outlined dense").style("width: 200px")
+            self.settings.build()
             self.begin = ui.button("Track", on_click=lambda: self.start()).props("unelevated")
             self.resume = ui.button("Go on", on_click=lambda: self.start("--resume")).props("unelevated")
             self.again = ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
@@ -154,7 +154,7 @@ class _Panel:
             self._say_end(command)
         if n_done != self.n_done:
             is_first, self.n_done = self.n_done < 0, n_done
-            self.bar.value = n_done / max(self.n_frames, 1)
+            self.bar.value = n_done / max(self.settings.n_frames, 1)
             self.view.run_method("refresh")
             self._show_curves()
             if newest is not None and self._is_running:
@@ -171,11 +171,11 @@ class _Panel:
                 self.curves = Curves(self._curves, frame=self.view.frame).style("height: 220px")
 
     def _say_progress(self, command: Command, n_done: int) -> None:
-        left = ""
+        left, n_frames = "", self.settings.n_frames
         if (n_own := n_done - self.n_before) > 2:
-            left = f", about {command.seconds / n_own * (self.n_frames - n_done):.0f} s left"
+            left = f", about {command.seconds / n_own * (n_frames - n_done):.0f} s left"
         self.says.text = (
-            f"{n_done} of {count(self.n_frames, 'frame')}, {command.seconds:.0f} s{left}"
+            f"{n_done} of {count(n_frames, 'frame')}, {command.seconds:.0f} s{left}"
             if n_done
             else (f"opening videos, {command.seconds:.0f} s")
         )

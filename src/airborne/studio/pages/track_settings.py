@@ -1,0 +1,69 @@
+"""How the next run is tracked: the method and the last frame, as the trial's [track] has them."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from airborne.errors import TrialError
+from airborne.studio.pages.layout import errors_shown
+from airborne.studio.session import Session
+from airborne.trial.settings import BODY_METHODS, PLAYERS_METHODS
+
+
+class TrackSettingsBar:
+    """One window's choices; they are written into the trial as they are made."""
+
+    def __init__(self, session: Session, n_images: int) -> None:
+        """Take what the trial has; its videos have this many frames. Raises TrialError for an unfinished one."""
+        self._session, self._n_images = session, n_images
+        self._trial = session.project().trial()
+
+    @property
+    def n_frames(self) -> int:
+        """How many frames are tracked."""
+        track = self._trial.track
+        stop = self._n_images if track.stop is None else min(self._n_images, track.stop)
+        return len(range(self._trial.start.frame, stop, track.every))
+
+    def build(self) -> None:
+        """Lay out the choices."""
+        methods = PLAYERS_METHODS if self._trial.has_players else BODY_METHODS
+        self._method = ui.select(list(methods), label="method", value=None, on_change=self._set_method)
+        self._method.props("outlined dense options-dense").style("min-width: 140px")
+        self._last = ui.number("last frame", min=0, max=self._n_images - 1, precision=0)
+        self._last.props("outlined dense clearable").style("width: 120px")
+        self._last.on("change", self._set_last, args=[]).on("clear", self._set_last, args=[])
+        self._first = ui.label().classes("small soft")
+        self._show()
+
+    def reread(self) -> None:
+        """Show what the trial has now."""
+        with errors_shown():
+            self._trial = self._session.project().trial()
+            self._show()
+
+    def _show(self) -> None:
+        track, frame = self._trial.track, self._trial.start.frame
+        self._method.set_value(track.method)
+        self._last.set_value(min(self._n_images, track.stop or self._n_images) - 1)
+        self._first.set_text(f"from frame {frame}, the first pose's")
+
+    def _set_method(self) -> None:
+        if self._method.value != self._trial.track.method:
+            self._set("method", self._method.value, f"method {self._method.value}")
+
+    def _set_last(self) -> None:
+        value, frame = self._last.value, self._trial.start.frame
+        last = self._n_images - 1 if value is None else int(value)
+        with errors_shown():
+            if last < frame:
+                raise TrialError(f"the first pose is that of frame {frame}; give a last frame from there on")
+            stop = last + 1 if last + 1 < self._n_images else None
+            if stop != self._trial.track.stop:
+                self._set("stop", stop, f"last frame {last}")
+        self._show()
+
+    def _set(self, key: str, value: object, what: str) -> None:
+        with errors_shown():
+            self._session.set_table("track", {key: value}, what)
+        self.reread()

@@ -1,0 +1,31 @@
+"""The method and the last frame of the next run, chosen in the step Track; in a real browser."""
+
+from airborne.io.text import read_toml
+from airborne.trial.settings import PLAYERS_METHODS
+from tests.support.players_trial import write_trial
+from tests.support.studio import fork_studio, open_page, wait_for_frame
+
+N, LAST = 6, 3
+
+
+def test_method_and_last_frame_are_written_into_the_trial_and_undone(tmp_path):
+    trial = write_trial(tmp_path / "block", N, track=f'method = "{PLAYERS_METHODS[0]}"  # a note')
+    with fork_studio(trial) as address, open_page(address.replace("/?", "/track?")) as page:
+        wait_for_frame(page, 0)
+        method, last = page.get_by_label("method"), page.get_by_label("last frame")
+        assert (method.input_value(), last.input_value()) == (PLAYERS_METHODS[0], str(N - 1))
+        method.click()
+        assert page.get_by_role("option").all_text_contents() == list(PLAYERS_METHODS)
+        page.get_by_role("option", name=PLAYERS_METHODS[1], exact=True).click()
+        last.fill(str(LAST))
+        last.press("Enter")
+        page.get_by_role("button", name="Undo").and_(page.locator(":enabled")).wait_for()
+        page.wait_for_timeout(1500)
+        assert read_toml(trial)["track"] == {"method": PLAYERS_METHODS[1], "stop": LAST + 1}
+        page.locator("canvas.view").press("Control+z")
+        page.wait_for_function("n => document.querySelector('[aria-label=\"last frame\"]').value == n", arg=str(N - 1))
+        page.locator("canvas.view").press("Control+z")
+        page.get_by_text(f"undone: method {PLAYERS_METHODS[1]}").first.wait_for()
+        assert method.input_value() == PLAYERS_METHODS[0]
+    assert read_toml(trial)["track"] == {"method": PLAYERS_METHODS[0]}
+    assert "# a note" in trial.read_text()
