@@ -48,6 +48,13 @@ def test_frames_are_in_doubt_where_any_joint_or_player_is(folder):
     assert len(players["lost"]) == 0
 
 
+STICKS = """() => {
+    const canvas = document.querySelector("canvas:not(.view):not(.curves)");
+    const { scene } = canvas ? getElement(Number(canvas.closest("[id^=c]").id.slice(1))) : {};
+    let n = 0;
+    scene?.traverseVisible((each) => { n += each.geometry?.type === "CylinderGeometry"; });
+    return n;
+}"""
 THINNED = """async (now) => {
     const { drawCurves } = await import("/parts/curves.js"), canvas = document.querySelector("canvas.curves");
     const series = [{ name: "x", unit: "m", value: [1, 1.25, 2, 2.5], sd: [0.05, 0.05, null, null] }];
@@ -80,5 +87,6 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back(folder):
             if run == "person":
                 says = "x 0.0450 ± 0.0032 m, y 0.0000 ± 0.0032 m, z 1.0000 ± 0.0032 m"
                 page.locator(f'canvas.curves[aria-description="{says}"]').wait_for()
+        page.wait_for_function(f"({STICKS})() === {2 * 5}")  # of two players, down both legs and across the hips
         assert page.get_by_role("button", name="next uncertain").is_enabled()
         assert not page.get_by_role("button", name="next lost").is_enabled()

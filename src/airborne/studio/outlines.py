@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,18 @@ def player_colours(y_m: Mapping[str, float]) -> dict[str, str]:
         for team, colours in zip(teams, _TEAM_COLOURS, strict=True)
         for number, name in enumerate(team)
     }
+
+
+def sides_m(motion: PlayersMotion) -> list[float]:
+    """Return where along y each player is, the median over a run [m]; 0 of one who is never found."""
+    y = motion.points[..., 1].swapaxes(0, 1)  # (players, n, joints)
+    return [float(np.nanmedian(each)) if np.isfinite(each).any() else 0.0 for each in y]
+
+
+def leg_rods(joints: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the pairs of joints that a stick figure of legs joins."""
+    chains = [[f"{limb}_{side}" for limb in LIMBS if f"{limb}_{side}" in joints] for side in ("left", "right")]
+    return [*(pair for chain in chains for pair in pairwise(chain)), (chains[0][0], chains[1][0])]
 
 
 def legs_items(

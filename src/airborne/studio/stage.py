@@ -133,12 +133,35 @@ class Arrow:
 
     def show(self, start_m: Array, along_m: Array) -> None:
         """Show it from a place (3,) [m] along a vector (3,) [m]; a vector without a direction hides it."""
-        length = float(np.linalg.norm(along_m))
-        self._group.visible(bool(length > _SHAFT_M))
-        if length > _SHAFT_M:
-            turn = Rotation.align_vectors(along_m[None], [[0.0, 1.0, 0.0]])[0]
-            x, y, z = map(float, start_m)
-            self._group.move(x, y, z).rotate_R(turn.as_matrix().tolist()).scale(1, length, 1)
+        _lay_along(self._group, start_m, along_m)
+
+
+class Sticks:
+    """Sticks in a scene, between any points."""
+
+    def __init__(self, scene: Scene, colours: Iterable[str]) -> None:
+        """Draw one of each colour, hidden."""
+        self._groups: list[Group] = []
+        with scene:
+            for colour in colours:
+                with scene.group().visible(False) as group:  # along y, a metre long
+                    scene.cylinder(_POINT_M, _POINT_M, 1).move(y=0.5).material(colour)
+                self._groups.append(group)
+
+    def show(self, ends_m: Array) -> None:
+        """Show them between their ends (sticks, 2, 3) [m]; NaN hides a stick."""
+        for group, (a, b) in zip(self._groups, np.nan_to_num(ends_m), strict=True):
+            _lay_along(group, a, b - a)
+
+
+def _lay_along(group: Group, start_m: Array, along_m: Array) -> None:
+    """Bring what is a metre long along y to a place (3,) [m], along a vector (3,) [m]; hide it without a direction."""
+    length = float(np.linalg.norm(along_m))
+    group.visible(bool(length > _SHAFT_M))
+    if length > _SHAFT_M:
+        turn = Rotation.align_vectors(along_m[None], [[0.0, 1.0, 0.0]])[0]
+        x, y, z = map(float, start_m)
+        group.move(x, y, z).rotate_R(turn.as_matrix().tolist()).scale(1, length, 1)
 
 
 class Redraw(Object3D, component="redraw.js"):

@@ -15,16 +15,17 @@ from nicegui.elements.scene.scene import Scene
 from airborne.motion.run_folder import SUMMARY, holds_players, read_summary
 from airborne.studio.curve_data import Momenta, curve_kinds, describe_distance, run_momenta
 from airborne.studio.disagreement import look_for_disagreement
-from airborne.studio.outlines import BESIDE_COLOUR
+from airborne.studio.outlines import BESIDE_COLOUR, leg_rods, player_colours, sides_m
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.jumps import Jumps
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
-from airborne.studio.runs import run_body, run_rig, run_rows
+from airborne.studio.runs import run_body, run_players, run_rig, run_rows
 from airborne.studio.session import Session
-from airborne.studio.stage import Arrow, BodyOnStage, draw_cameras, overview, reach_of
+from airborne.studio.stage import Arrow, BodyOnStage, Sticks, draw_cameras, overview, reach_of
 from airborne.studio.view import CameraViews, Curves
+from airborne.tracking import Status
 
 _MOMENTUM_COLOUR, _LONGEST_M = "#d55e00", 1.0  # its arrow's length where it is greatest in the run
 _HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations, numbers ± one."
@@ -135,9 +136,11 @@ async def _show_run(
                 on_move=None if correction is None else correction.move,
                 on_drag=None if correction is None else correction.drag,
             )
-        if correction is not None:
-            correction.view = view
-            with ui.element("div").classes("side"):
+        with ui.element("div").classes("side"):
+            if correction is None:
+                bodies.append(await _players_stage(folder, session.frame))
+            else:
+                correction.view = view
                 correction.build_watch()
                 bodies += await _stage(folder, view)
     curves = Curves(address, frame=frame)
@@ -159,6 +162,27 @@ async def _stage(folder: Path, view: CameraViews) -> list[Callable[[int], None]]
         body.show(run_rows(folder).pose(frame))
 
     return [show, MomentumArrow(folder, view, scene).show]
+
+
+async def _players_stage(folder: Path, frame: int) -> Callable[[int], None]:
+    """Build the scene of a run of players at a frame, sticks down their legs; return what shows another in it."""
+    motion = await in_thread(run_players, folder, says="reading the run")
+    points = motion.points[np.isfinite(motion.points).all(axis=3)]  # (n, 3)
+    scene = draw_cameras(run_rig(folder), seen_from=overview(points) if len(points) else None)
+    colours = player_colours(dict(zip(motion.players, sides_m(motion), strict=True)))
+    rods = [(motion.joints.index(a), motion.joints.index(b)) for a, b in leg_rods(motion.joints)]
+    sticks = Sticks(scene, [colours[name] for name in motion.players for _ in rods])
+
+    def show(frame: int) -> None:
+        row = int(np.searchsorted(motion.index, frame))
+        ends = np.full((len(motion.players), len(rods), 2, 3), np.nan)
+        if row < len(motion.index) and motion.index[row] == frame:
+            is_there = motion.status[row] != Status.LOST.value
+            ends[is_there] = motion.points[row][is_there][:, rods]
+        sticks.show(ends.reshape(-1, 2, 3))
+
+    show(frame)
+    return show
 
 
 class MomentumArrow:
