@@ -138,7 +138,7 @@ async def _show_run(
             )
         with ui.element("div").classes("side"):
             if correction is None:
-                bodies.append(await _players_stage(folder, session.frame))
+                bodies.append(await _players_stage(folder, view.frame))
             else:
                 correction.view = view
                 correction.build_watch()
