@@ -61,6 +61,9 @@ def test_two_events_give_the_offset_and_its_deviation(folder):
         page.get_by_text("written: offset of second: -200.0 ms").wait_for()
         by_hand = read_toml(folder / "trial.toml")["camera"][1]
         page.reload()
+        page.get_by_text("2 events: -200.0 ± 9.1 ms").wait_for()  # they are kept
+        for _ in range(2):
+            page.get_by_role("button", name="Remove the last event").click()
         page.get_by_text("The trial has -200.0 ± 9.1 ms for second.").wait_for()
         page.get_by_label("from").click()
         page.get_by_role("option", name="a flash").click()

@@ -26,7 +26,7 @@ def slow(function):
 def slow_down():
     """Let what the studio reads, and the end of a command, take their time."""
     body.list_bodies, body.list_measurements = slow(body.list_bodies), slow(body.list_measurements)
-    cameras._list_calibrations = slow(cameras._list_calibrations)
+    cameras.list_calibrations = slow(cameras.list_calibrations)
     results._read_run = slow(results._read_run)
     Command.stop = slow(Command.stop)
     Session.rig = slow(Session.rig)
