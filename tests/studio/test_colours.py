@@ -10,8 +10,8 @@ import pytest
 import airborne
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.studio.outlines import _TEAM_COLOURS, BESIDE_COLOUR
-from airborne.studio.pages import control_points, correct, digitise, layout
-from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR
+from airborne.studio.pages import control_points, correct, layout
+from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR
 from airborne.studio.starts import POSE_COLOUR
 
 LEAST_APART = 15.0  # CIE 1976 colour difference; 2.3 is just noticeable side by side (Mahy et al. 1994)
@@ -36,8 +36,8 @@ TOGETHER = {
     "strips": [*STRIPS.values(), SHEET["paper"]],
     "outlines": [*map(hex_colour, STATUS_RGB.values()), BESIDE_COLOUR, POSE_COLOUR, correct._JOINT_COLOUR],
     "clicks": [*CAMERA_COLOURS, CHOSEN_COLOUR],
-    "clicks of points": [control_points._CLICKED, control_points._PREDICTED, CHOSEN_COLOUR],
-    "clicks of a person": [digitise._PREDICTED, CHOSEN_COLOUR],
+    "clicks of points": [control_points._CLICKED, PREDICTED_COLOUR, CHOSEN_COLOUR],
+    "clicks of a person": [PREDICTED_COLOUR, CHOSEN_COLOUR],
     "players": [*_TEAM_COLOURS[0], *_TEAM_COLOURS[1], CHOSEN_COLOUR],
 }
 

@@ -119,7 +119,7 @@ class DigitisePanel(PointsPanel):
             change.props("flat dense")
         self.note = ui.label().classes("small")
         with ui.element("div").classes("row-line"):
-            then = ui.select(_AFTER, label="after a click", value=self.then, on_change=self._set_then)
+            then = ui.select(_AFTER, label="after a click").bind_value(self, "then")
             then.props("outlined dense options-dense").style("width: 180px")
             ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
 
@@ -279,9 +279,6 @@ class DigitisePanel(PointsPanel):
             return self.off_px(name, self.rig)
         px = self.px(name, self.shown.names)
         return np.isfinite(px[:, 0]), np.full(len(px), np.nan)
-
-    def _set_then(self, event) -> None:
-        self.then = event.value
 
     def _kept(self) -> list[str]:
         draft = self.session.draft(_DRAFT)
