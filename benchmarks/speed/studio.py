@@ -201,7 +201,7 @@ def measure_short(folder: Path, second: Path, steps: int) -> dict[str, list[floa
     """Measure steps, jumps and drags on a clip of 20 seconds."""
     write_trial(folder, second, list(PLACES), 20)
     rig = write_run(folder, 20 * RATE)
-    with open_studio(folder) as address, open_page(address.replace("/?", "/track?"), is_watched=False) as page:
+    with open_studio(folder) as address, open_page(address.replace("/?", "/track?")) as page:
         wait_for_frame(page, 0)
         page.wait_for_timeout(3000)  # what the kernels compile, once
         begun_s = server()[1]
@@ -228,7 +228,7 @@ def name_jumps(kind: str, measured: tuple[list[float], list[float], list[float]]
 def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[float]]:
     """Measure the first picture of four long videos, and memory after jumps through them."""
     write_trial(folder, second, ["a", "b", "c", "d"], round(60 * minutes))
-    with open_studio(folder) as address, open_page(address, is_watched=False) as page:
+    with open_studio(folder) as address, open_page(address) as page:
         page.get_by_text("Use these cameras").wait_for()
         begun = time.monotonic()
         page.goto(address.split("?")[0] + "track")
@@ -260,9 +260,9 @@ def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
             file.writelines(f"{k},{k / RATE!r},{each.name},{PLACE},{status}\n" for each in PERSON.landmarks)
     write_team(folder / "team", runs)
     os.utime(runs)  # the newest is shown first
-    with open_studio(folder) as address, open_page(address, is_watched=False) as page:
+    with open_studio(folder) as address, open_page(address) as page:
         found = {"results, for the first time: Review open": [review_ms(page, address)]}
-    with open_studio(folder) as address, open_page(address, is_watched=False) as page:
+    with open_studio(folder) as address, open_page(address) as page:
         for name, n_frames in (("results", N_MANY), ("team", N_TEAM_FRAMES)):
             os.utime(folder / name)
             found |= {f"{name}: Review open": [review_ms(page, address)]}

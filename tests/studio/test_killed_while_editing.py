@@ -39,7 +39,7 @@ def folder(tmp_path_factory):
 @contextlib.contextmanager
 def open_window(folder, path):
     """Open a page of the studio in a window whose complaints about a lost server do not count."""
-    with fork_studio(folder) as address, open_page(address, is_watched=False) as first:
+    with fork_studio(folder) as address, open_page(address) as first:
         window = first.context.new_page()
         window.goto(f"http://{address.split('/')[2]}{path}")
         first.goto("about:blank")
