@@ -24,7 +24,7 @@ from tests.support.studio import MINUTE, User, open_page, open_studio, wait_for_
 MOST_CLICKS = 60
 N_POINTS = 12  # surveyed points that are clicked in all three cameras
 MOST_WORSE = 1.1  # times the error of the prepared trial with the same clicks, tracked with the same code
-MOST_WORSE_OF_FEW = 2.0  # times that with all of its points: twelve that are clicked a pixel off calibrate worse
+MOST_MM = 2.5  # twice what the trial has with all of its points: twelve that are clicked a pixel off calibrate worse
 
 
 @pytest.fixture
@@ -90,11 +90,10 @@ def draw_digitising(page, folder):
         draw_example(page, "digitise")
 
 
-def prepared_error_mm(folder, points=None):
-    """Track the trial as it is bundled, its start set by hand, with all its surveyed points or with others."""
+def prepared_error_mm(folder, points):
+    """Track the trial as it is bundled, its start set by hand, with other surveyed points."""
     trial = read_trial(THROWN_CROSS / "trial.toml")
-    if points is not None:
-        trial = trial.model_copy(update={"calibration": CalibrationTable(control_points=str(points))})
+    trial = trial.model_copy(update={"calibration": CalibrationTable(control_points=str(points))})
     track_trial(trial, folder, pictures=False)
     return error_mm(folder)
 
@@ -191,10 +190,8 @@ def test_the_thrown_cross_from_videos_to_report(folder):
         draw_example(page, "results")
         draw_digitising(page, folder)
         popup.value.get_by_role("heading").first.wait_for()
-    by_hand_mm, prepared_mm = error_mm(folder / "results"), prepared_error_mm(folder / "prepared")
-    alike_mm = prepared_error_mm(folder / "alike", folder / "survey.csv")
-    print(f"{user.clicks} clicks, {by_hand_mm:.2f} mm; prepared {prepared_mm:.2f}, with these clicks {alike_mm:.2f} mm")
+    by_hand_mm, prepared_mm = error_mm(folder / "results"), prepared_error_mm(folder / "alike", folder / "survey.csv")
+    print(f"{user.clicks} clicks, {by_hand_mm:.2f} mm; prepared with these clicks {prepared_mm:.2f} mm")
     assert user.clicks <= MOST_CLICKS
-    assert by_hand_mm <= MOST_WORSE * alike_mm
-    assert by_hand_mm <= MOST_WORSE_OF_FEW * prepared_mm
+    assert by_hand_mm <= min(MOST_WORSE * prepared_mm, MOST_MM)
     assert {request.split("/")[2] for request in requests} == {address.split("/")[2]}
