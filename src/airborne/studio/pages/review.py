@@ -47,7 +47,7 @@ async def review_page(session: Session) -> None:
         def frame() -> int:
             return session.frame if view is None else view.frame
 
-        jumps = Jumps(frame)
+        jumps = Jumps()
 
         async def change() -> None:
             nonlocal view
@@ -56,12 +56,13 @@ async def review_page(session: Session) -> None:
                 beside.set_options(["", *others], value="")  # which calls this again
                 return
             beside.set_options(["", *others])
-            await jumps.turn_to(session.folder / choice.value)
-            content.clear()
-            with content:
-                folder = session.folder / choice.value
-                view, correction = await _show_run(session, shown, folder, beside.value, frame())
-            changed[:] = [] if correction is None else [correction.reread]
+            folder = session.folder / choice.value
+            async with jumps.turning_to(folder):
+                content.clear()
+                with content:
+                    view, correction = await _show_run(session, shown, folder, beside.value, frame())
+                jumps.view = view
+                changed[:] = [] if correction is None else [correction.reread]
 
         with ui.element("div").classes("row-line"):
             choice = ui.select(names, label="run", value=names[0], on_change=change)
