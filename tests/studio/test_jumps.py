@@ -119,3 +119,9 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back_of_the_run_that_is_chosen(f
         page.keyboard.press("r")  # before that run is there
         wait_for_run(page, "person")
         wait_for_frame(page, LOST)
+        page.keyboard.press("Home")  # the pictures were not clicked
+        wait_for_frame(page, 0)
+        page.get_by_role("button", name="next lost").press("ArrowRight")
+        wait_for_frame(page, 1)
+        page.get_by_role("button", name="next lost").press(" ")  # which has pressed it
+        wait_for_frame(page, LOST)

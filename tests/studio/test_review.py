@@ -67,5 +67,7 @@ def test_a_run_is_searched_for_doubt_and_compared_with_another(folder):
         assert BESIDE_COLOUR not in page.evaluate(colours)
         page.get_by_label("Compare with").click()
         page.get_by_role("option", name="second").click()
-        page.get_by_text(f"roots: median {1e3 * HIGHER_M:.0f} mm, at most {1e3 * HIGHER_M:.0f} mm").wait_for()
+        page.get_by_text(
+            f"positions are {1e3 * HIGHER_M:.0f} mm apart, the median; at most {1e3 * HIGHER_M:.0f} mm"
+        ).wait_for()
         page.wait_for_function(f"(({colours})() || []).includes('{BESIDE_COLOUR}')")

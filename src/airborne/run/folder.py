@@ -74,12 +74,10 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
-    first = {frame: digest for frame, digest in identity["keys"].items() if digest == START}
-    recorded = {"keys": first, "masks": [], **read_record(record)}  # older records have neither
+    recorded = _with_keys(read_record(record), identity)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
     if table == MOTION and changed and set(changed) <= {"keys", "masks"}:
-        masks = [mask for mask in (*recorded["masks"], *identity["masks"]) if _is_changed(mask, recorded, identity)]
-        again = stretches_of(recorded["keys"], identity["keys"], [(mask["first"], mask["last"]) for mask in masks])
+        again = stretches_between(recorded, identity)
         drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
         write_json(record, identity)
     elif changed:
@@ -100,6 +98,19 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
     if name == "settings":
         return "; ".join(f"{key} = {before.get(key)}, now {now.get(key)}" for key in differing)
     return f"other {', '.join(differing)}" if name == "inputs" else f"other {name}"
+
+
+def stretches_between(recorded: dict[str, Any], identity: dict[str, Any]) -> list[tuple[float, float]]:
+    """Return what is tracked again between two identities that differ in keys and masks alone; see `stretches_of`."""
+    recorded = _with_keys(recorded, identity)
+    masks = [mask for mask in (*recorded["masks"], *identity["masks"]) if _is_changed(mask, recorded, identity)]
+    return stretches_of(recorded["keys"], identity["keys"], [(mask["first"], mask["last"]) for mask in masks])
+
+
+def _with_keys(recorded: dict[str, Any], identity: dict[str, Any]) -> dict[str, Any]:
+    """Return a record with keys and masks; older ones have neither, and only the start of what they are beside."""
+    first = {frame: digest for frame, digest in identity["keys"].items() if digest == START}
+    return {"keys": first, "masks": [], **recorded}
 
 
 def _is_changed(mask: dict[str, Any], *identities: Mapping[str, Any]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -71,6 +72,11 @@ class Command:
     def progress(self) -> str:
         """Return the last line of what it says beside its output."""
         return self._log.read_text(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
+
+    def counted(self) -> int:
+        """Return how many frames, or whatever it counts, it said last that it has done; 0 before it said so."""
+        found = re.search(r"(\d+) of \d+$", self.progress())
+        return int(found[1]) if found else 0
 
     def stop(self) -> None:
         """Stop it as Ctrl-C does, and wait for its end."""

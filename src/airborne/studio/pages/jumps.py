@@ -39,10 +39,17 @@ class Jumps:
         """Jump among the frames of this run from now on, as soon as it is laid out; that is done inside."""
         async with self._one_at_a_time:
             self._run = run
-            with errors_shown():
-                for what, frames in (await in_thread(doubtful_frames, run, says="reading the run")).items():
-                    self._buttons[what].set_enabled(len(frames) > 0)
+            await self.look()
             yield
+
+    async def look(self) -> None:
+        """Say how many such frames the run has now."""
+        if self._run is None:
+            return
+        with errors_shown():
+            for what, frames in (await in_thread(doubtful_frames, self._run, says="reading the run")).items():
+                self._buttons[what].set_enabled(len(frames) > 0)
+                self._buttons[what].set_text(f"Next {what}: {len(frames) or 'none'}")
 
     async def press(self, event: KeyEventArguments) -> None:
         """Jump by key."""

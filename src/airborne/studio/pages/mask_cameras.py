@@ -30,9 +30,9 @@ class MaskPanel:
         with ui.element("div").classes("row-line") as self.area:
             self.camera = ui.select(shown.names, label="camera", value=shown.names[0])
             self.camera.props("outlined dense options-dense").style("min-width: 150px")
-            last = len(shown.clock) - 1
+            self._end = len(shown.clock) - 1  # the last frame
             self.first, self.last = (
-                ui.number(label, min=0, max=last, precision=0).props("outlined dense").style("width: 110px")
+                ui.number(label, min=0, max=self._end, precision=0).props("outlined dense").style("width: 110px")
                 for label in ("from frame", "to frame")
             )
             ui.button("Leave it out", on_click=self.add).props("outline")
@@ -53,7 +53,7 @@ class MaskPanel:
             if name in left_out:
                 corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]
                 items.append({"pane": pane, "points": corners, "closed": True, "fill": _VEIL})
-                items.append({"pane": pane, "points": [[0.45 * width, 0.5 * height]], "text": "left out"})
+                items.append({"pane": pane, "points": [[0.04 * width, 0.94 * height]], "text": "left out"})
         return items
 
     def add(self) -> None:
@@ -62,9 +62,8 @@ class MaskPanel:
         first, last = (self._frame_of() if number is None else int(number) for number in numbers)
         camera = str(self.camera.value)
         with errors_shown():
-            if last < first:
-                raise TrialError(f"the last frame, {last}, lies before the first, {first}; exchange them")
-            what = f"{camera} left out of frames {first} to {last}"
+            last, note = clip_frames(first, last, self._end)
+            what = f"{camera} left out of frames {first} to {last}{note}"
             self._edit(lambda text: with_mask(text, camera, first, last), what)
 
     def remove(self, number: int, camera: str) -> None:
@@ -82,3 +81,15 @@ class MaskPanel:
             text = f"{mask['camera']}: {mask['first']} to {mask['last']}  ✕"
             button = ui.button(text, on_click=partial(self.remove, number, str(mask["camera"])))
             button.props("flat dense no-caps").tooltip("use it again")
+
+
+def clip_frames(first: int, last: int, end: int) -> tuple[int, str]:
+    """Return the last frame of a stretch of videos that end with a frame, and what to say where that is another.
+
+    Raises TrialError for a stretch that holds none of their frames.
+    """
+    if last < first:
+        raise TrialError(f"the last frame, {last}, lies before the first, {first}; exchange them")
+    if not 0 <= first <= end:
+        raise TrialError(f"the videos have frames 0 to {end}, not {first}; give a first frame of them")
+    return (last, "") if last <= end else (end, f", the last there is: {last} was asked for")
