@@ -79,6 +79,7 @@ def prepare_folder(
     if table == MOTION and changed and set(changed) <= {"keys", "masks"}:
         again = stretches_between(recorded, identity)
         drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
+        (folder / SUMMARY).unlink(missing_ok=True)  # it is not finished until they are tracked again
         write_json(record, identity)
     elif changed:
         differences = "; ".join(_describe_change(name, recorded, identity) for name in changed)

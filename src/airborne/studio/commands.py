@@ -24,7 +24,7 @@ class Command:
     def __init__(self, words: Sequence[str], folder: Path) -> None:
         """Start `airborne` with these words in a folder."""
         self.words = tuple(words)
-        self.started_s = time.monotonic()
+        self.started_s, self._began_s = time.monotonic(), time.time()
         self._out: bytes = b""
         self.is_told = False  # a page has shown what came of it
         self._log = folder / FOLDER / f"{words[0]}_{next(_numbers)}.log"
@@ -77,6 +77,10 @@ class Command:
         """Return how many frames, or whatever it counts, it said last that it has done; 0 before it said so."""
         found = re.search(r"(\d+) of \d+$", self.progress())
         return int(found[1]) if found else 0
+
+    def has_written(self, path: Path) -> bool:
+        """Say whether a file has changed since it began."""
+        return path.is_file() and path.stat().st_mtime >= self._began_s
 
     def stop(self) -> None:
         """Stop it as Ctrl-C does, and wait for its end."""

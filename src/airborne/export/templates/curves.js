@@ -48,7 +48,7 @@ function drawStill(pen, box, data) {
   const others = data.beside ? data.beside.series : [];
   const [low, high] = rangeOf([...series, ...others]), y = (value) => bottom - ((value - low) / (high - low)) * height;
   drawAxes(pen, low, high, y, box.width, series.length ? series[0].unit : "");
-  drawTimes(pen, data, x, TOP, box.height - BOTTOM);
+  drawTimes(pen, data, x, TOP, box.height - BOTTOM, box.width - 4);
   series.forEach((each, k) => drawCurve(pen, each, COLOURS[k % COLOURS.length], frame, x, y));
   pen.save();
   pen.beginPath();
@@ -123,7 +123,7 @@ function drawAxes(pen, low, high, y, width, unit) {
 }
 
 // Lines at round times over the curves, and below all strips how many seconds each is.
-function drawTimes(pen, { frame, time_s }, x, top, bottom) {
+function drawTimes(pen, { frame, time_s }, x, top, bottom, right) {
   const step = stepOf((time_s.at(-1) - time_s[0]) / 8);
   pen.textAlign = "center";
   for (let k = 1, at = Math.ceil(time_s[0] / step); step > 0 && at * step <= time_s.at(-1); at++) {
@@ -131,7 +131,8 @@ function drawTimes(pen, { frame, time_s }, x, top, bottom) {
     const share = k < frame.length ? (at * step - time_s[k - 1]) / (time_s[k] - time_s[k - 1]) : 0;
     const place = x(frame[k - 1] + (share ? share * (frame[k] - frame[k - 1]) : 0));
     pen.fillStyle = "#5d666f";
-    pen.fillText(`${Number((at * step).toPrecision(6))} s`, place, bottom + 12);
+    const text = `${Number((at * step).toPrecision(6))} s`;
+    pen.fillText(text, Math.min(place, right - pen.measureText(text).width / 2), bottom + 12);
     pen.strokeStyle = "#eceff1";
     pen.beginPath();
     pen.moveTo(place, top);

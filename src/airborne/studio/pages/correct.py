@@ -47,7 +47,7 @@ class Correction:
         self._before: RunBefore | None = None  # the run when this window tracked it again
         cameras = run_rig(self.folder).select(shown.names).cameras
         self.hand = PoseHand(run_body(self.folder), cameras, lambda pose: self._marks(pose, {}))
-        self._seen = self._tracked = self._held()  # when this window looked last; when it last tracked
+        self._seen = self._tracked = self._asked = self._held()  # when it looked last; of the run; when it was tracked
 
     @property
     def frame(self) -> int:
@@ -196,17 +196,18 @@ class Correction:
 
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""
-        self._tracked = self._held()
+        self._asked = self._held()
         with errors_shown():
             self._before = RunBefore.of(self.folder)
         self.watch.start("track", self.session.path.name, "-o", self.folder.name, "--resume")
-        self.again.set_visibility(False)
 
     async def show_anew(self, command: Command) -> None:
         """Show what came of it."""
         if self.folder.name not in command.words:  # another run
             return
         await self._files.look()
+        self._tracked = self._asked
+        self.again.set_visibility(self._held() != self._tracked)
         before, text = self._before, "tracked again"
         with errors_shown():
             if before is not None:

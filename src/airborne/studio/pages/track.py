@@ -116,8 +116,15 @@ class _Panel:
 
     def _count(self) -> tuple[int, int | None]:
         """Return how many frames the run holds so far, and which is the newest."""
-        run = find_run(self.session.folder, self._name)
-        return (0, None) if run is None else count_rows(run)
+        run, command = find_run(self.session.folder, self._name), self._command
+        if run is None or (
+            command is not None
+            and command.is_running
+            and "--overwrite" in command.words
+            and not command.has_written(run / MOTION)
+        ):
+            return 0, None  # what is there is the run before
+        return count_rows(run)
 
     def start(self, *options: str) -> None:
         """Start `airborne track`."""
