@@ -10,6 +10,7 @@ from airborne.cameras import Rig, camera_looking_at
 from airborne.motion import MotionWriter, read_motion
 from airborne.motion.files import read_estimates
 from airborne.motion.rows import read_rows
+from airborne.run.folder import lacks_corrections
 from airborne.studio.ghosts import ghost_of
 from airborne.studio.runs import describe_progress
 from airborne.studio.tracked_again import RunBefore, describe_tracked_again, name_frames
@@ -83,6 +84,17 @@ def test_it_says_what_is_lost_and_what_to_do(run):
 
 def test_it_says_where_nothing_was_tracked_again(run):
     assert track_again(run, {}) == "no frame was tracked again: the corrections touch none of frames 0 to 11"
+
+
+def test_a_run_lacks_the_corrections_that_its_trial_got_since(run):
+    record, trial = run / "run.json", run.parent / "trial.toml"
+    trial.write_text(TRIAL)
+    record.write_text(json.dumps({"keys": {"0": "start"}, "masks": []}))
+    assert not lacks_corrections(read_trial(trial), run)
+    trial.write_text(f'{TRIAL}[[mask]]\ncamera = "a"\nfirst = 3\nlast = 4\n')
+    assert lacks_corrections(read_trial(trial), run)
+    record.unlink()
+    assert not lacks_corrections(read_trial(trial), run)
 
 
 def test_frames_are_named_by_stretches():

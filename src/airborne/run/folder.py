@@ -186,12 +186,24 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     """Return what two runs share if one can resume the other."""
     settings = {
         "inputs": input_hashes(trial, live=live),
-        "keys": _key_digests(trial),
-        "masks": [mask.model_dump() for mask in trial.mask],
+        **_corrections(trial),
         "settings": trial.track.model_dump(),
         "version": __version__,
     }
     return json.loads(json.dumps(settings))
+
+
+def lacks_corrections(trial: Trial, folder: Path) -> bool:
+    """Say whether a trial has other keys or masks than its run in a folder was tracked with; not without a record."""
+    if not (folder / RUN_RECORD).is_file():
+        return False
+    now = json.loads(json.dumps(_corrections(trial)))
+    recorded = _with_keys(read_record(folder / RUN_RECORD), now)
+    return any(recorded[name] != now[name] for name in now)
+
+
+def _corrections(trial: Trial) -> dict[str, Any]:
+    return {"keys": _key_digests(trial), "masks": [mask.model_dump() for mask in trial.mask]}
 
 
 def _key_digests(trial: Trial) -> dict[str, str]:

@@ -13,7 +13,10 @@ from pathlib import Path
 
 from airborne.studio.writing import FOLDER
 
-_RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
+_RUN = (
+    "import sys; sys.argv[0] = 'airborne'; from airborne.io import terminal; terminal.seconds_a_line = 0.5; "
+    "from airborne.cli import main; main()"
+)
 _numbers = count(1)  # of the commands: two exports may run at once
 _PATIENCE_S = 10.0  # for a process that was told to stop
 
@@ -72,6 +75,10 @@ class Command:
     def progress(self) -> str:
         """Return the last line of what it says beside its output."""
         return self._log.read_text(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
+
+    def how_far(self) -> str:
+        """Return the last line of what it says beside its output; of one that counts, the numbers."""
+        return re.sub(r"^.*: (?=\d+ of \w+$)", "", self.progress())
 
     def counted(self) -> int:
         """Return how many frames, or whatever it counts, it said last that it has done; 0 before it said so."""

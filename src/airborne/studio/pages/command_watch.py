@@ -36,7 +36,7 @@ class CommandWatch:
         `on_end` is called with a command that ends well; what another says is shown. With `again` that goes for one
         that had ended before the page was opened, too.
         """
-        self.session, self.name, self._on_end, self._words, self._codes = session, name, on_end, words, codes
+        self.session, self.name, self._on_end, self.words, self._codes = session, name, on_end, words, codes
         self._how_far = how_far
         self._ended = None if again or self.is_running else self.command
         self.buttons: list[ui.button] = []  # that wait while it runs
@@ -88,7 +88,7 @@ class CommandWatch:
         for button in self.buttons:
             button.set_enabled(not is_running)
         if command is not None and is_running:
-            line = command.progress().removeprefix(f"{self._words}: ") if self._how_far is None else self._how_far()
-            self.says.set_text(f"{self._words}, {command.seconds:.0f} s{': ' if line else ''}{line}")
+            line = command.how_far() if self._how_far is None else self._how_far()
+            self.says.set_text(f"{self.words}, {command.seconds:.0f} s{': ' if line else ''}{line}")
         elif command is not self._ended:
             self.says.set_text("")

@@ -11,6 +11,7 @@ from nicegui import ui
 from airborne.body import Pose
 from airborne.cameras import Camera
 from airborne.errors import TrialError
+from airborne.run.folder import lacks_corrections
 from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.ghosts import ghost_of
@@ -47,7 +48,8 @@ class Correction:
         self._before: RunBefore | None = None  # the run when this window tracked it again
         cameras = run_rig(self.folder).select(shown.names).cameras
         self.hand = PoseHand(run_body(self.folder), cameras, lambda pose: self._marks(pose, {}))
-        self._seen = self._tracked = self._asked = self._held()  # when it looked last; of the run; when it was tracked
+        self._seen = self._asked = self._held()  # when this window looked last, and tracked last
+        self._tracked: tuple[Any, Any] | None = self._seen  # what the run was tracked with; None: something else
 
     @property
     def frame(self) -> int:
@@ -67,9 +69,18 @@ class Correction:
             self.again = ui.button("Track again around it", on_click=self.track).props("unelevated")
             self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking", how_far=self._how_far)
             self.watch.buttons = [self.again]
-        self.again.set_visibility(False)
+        self._find_untracked()
         self.hint = ui.label().classes("small")
         self.hint.bind_visibility_from(self.switch, "value")
+
+    def _find_untracked(self) -> None:
+        """Offer to track again where the trial has corrections that the run has not been tracked with."""
+        project = self.session.project()
+        with errors_shown():
+            if not project.mistake and project.table("start") and lacks_corrections(project.trial(), self.folder):
+                self._tracked = None
+                self.watch.says.set_text("the trial has corrections that this run was tracked without")
+        self.again.set_visibility(self._tracked is None)
 
     def _how_far(self) -> str:
         """Say how many frames the run has while it is tracked again."""

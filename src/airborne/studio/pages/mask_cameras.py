@@ -13,7 +13,7 @@ from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_mask, without_mask
-from airborne.studio.view import Item
+from airborne.studio.view import CameraViews, Item
 
 _VEIL = "#16191dcc"  # over a picture that is left out
 _KEYS = {"camera", "first", "last"}
@@ -81,6 +81,44 @@ class MaskPanel:
             text = f"{mask['camera']}: {mask['first']} to {mask['last']}  ✕"
             button = ui.button(text, on_click=partial(self.remove, number, str(mask["camera"])))
             button.props("flat dense no-caps").tooltip("use it again")
+
+
+class PlayersMasks:
+    """What can be corrected of a run of players: cameras are left out, and it is tracked again from its start."""
+
+    def __init__(self, session: Session, shown: ShownTrial) -> None:
+        """Begin with nothing that is shown, until the switch is on."""
+        self.session, self.shown = session, shown
+        self.view: CameraViews | None = None
+
+    def build(self) -> None:
+        """Lay out the switch, and what leaves a camera out."""
+        self._switch = ui.switch("Leave cameras out", on_change=lambda: self.turn_to(self._frame))
+        self._masks = MaskPanel(self.session, self.shown, lambda: self._frame, self._note_change)
+        self._masks.area.bind_visibility_from(self._switch, "value")
+
+    def build_watch(self) -> None:
+        """Lay out the line that says what to do then."""
+        self._says = ui.label().classes("small soft")
+        self._says.bind_visibility_from(self._says, "text")
+
+    @property
+    def _frame(self) -> int:
+        return self.session.frame if self.view is None else self.view.frame
+
+    def turn_to(self, frame: int) -> None:
+        """Show what is left out of a frame."""
+        if self.view is not None:
+            self.view.show_over((), self._masks.items(frame) if self._switch.value else ())
+
+    async def reread(self) -> None:
+        """Show what the trial holds now."""
+        self._masks.list.refresh()
+        self.turn_to(self._frame)
+
+    def _note_change(self, what: str) -> None:
+        self._says.set_text(f"{what}; players are tracked again from the start, in the step Track")
+        self.turn_to(self._frame)
 
 
 def clip_frames(first: int, last: int, end: int) -> tuple[int, str]:

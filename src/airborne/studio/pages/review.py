@@ -18,7 +18,8 @@ from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR, leg_rods, player_colours, sides_m
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.jumps import Jumps
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.mask_cameras import PlayersMasks
 from airborne.studio.pages.run_watch import RunWatch
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
@@ -67,6 +68,7 @@ async def review_page(session: Session) -> None:
                 return
             beside.set_options(["", *others])
             folder = session.folder / choice.value
+            blame.set_visibility(not holds_players(folder))  # which have no outline to compare
             async with jumps.turning_to(folder):
                 content.clear()
                 with content:
@@ -74,7 +76,7 @@ async def review_page(session: Session) -> None:
                     view, correction = await _show_run(session, shown, files, beside.value, frame())
                     files.changed.append(jumps.look)
                 jumps.view = view
-                changed[:] = [list_anew, *([] if correction is None else [correction.reread])]
+                changed[:] = [list_anew, correction.reread]
 
         with ui.element("div").classes("row-line"):
             choice = ui.select(list(names), label="run", value=names[0], on_change=change)
@@ -93,9 +95,6 @@ async def review_page(session: Session) -> None:
 
 async def _blame(session: Session, shown: ShownTrial, folder: Path, frame: int, says: ui.label) -> None:
     """Say which camera disagrees with the run about the frame in view."""
-    if holds_players(folder):
-        complain("players have no outline to compare; this is for a run of one body")
-        return
     text = await work(
         "comparing edges with outlines", lambda: look_for_disagreement(folder, frame, shown, session.pictures)
     )
@@ -105,21 +104,20 @@ async def _blame(session: Session, shown: ShownTrial, folder: Path, frame: int, 
 
 async def _show_run(
     session: Session, shown: ShownTrial, files: RunWatch, beside: str, frame: int
-) -> tuple[CameraViews, Correction | None]:
+) -> tuple[CameraViews, Correction | PlayersMasks]:
     """Lay a run out, at a frame, and let what shows it be shown anew when its files change.
 
     Return its pictures, and what corrects it.
     """
     folder = files.folder
     bodies: list[Callable[[int], Any]] = []
-    correction = None if holds_players(folder) else Correction(session, shown, files)
+    correction = PlayersMasks(session, shown) if holds_players(folder) else Correction(session, shown, files)
     alarms = ui.refreshable(_show_alarms)
     await alarms(folder)
     address = f"/curves/{quote(folder.name)}?beside={quote(beside)}&of="
     with ui.element("div").classes("row-line"):
-        if correction is not None:
-            correction.build()
-            bodies.append(correction.turn_to)
+        correction.build()
+        bodies.append(correction.turn_to)
         kinds = await in_thread(curve_kinds, folder, says="reading the run")
         kind = ui.select(kinds, label="curves", value="", on_change=lambda: curves.show(address + quote(kind.value)))
         kind.props("outlined dense options-dense").style("min-width: 180px")
@@ -147,23 +145,24 @@ async def _show_run(
                 frame=frame,
                 overlay=f"/overlay/{quote(folder.name)}/{{frame}}{query}",
                 on_frame=turn_to,
-                on_move=None if correction is None else correction.move,
-                on_drag=None if correction is None else correction.drag,
+                on_move=correction.move if isinstance(correction, Correction) else None,
+                on_drag=correction.drag if isinstance(correction, Correction) else None,
             )
+            correction.view = view
         with ui.element("div").classes("side"):
-            if correction is None:
+            correction.build_watch()
+            if isinstance(correction, PlayersMasks):
                 bodies.append(await _players_stage(folder, view.frame))
             else:
-                correction.view = view
-                correction.build_watch()
                 bodies += await _stage(files, view)
     curves = Curves(address, frame=frame)
-    files.changed += [
-        lambda: view.run_method("refresh"),
-        lambda: curves.run_method("load"),
-        alarms.refresh,
-        lambda: turn_to(view.frame),
-    ]
+
+    def draw_anew() -> None:
+        view.run_method("refresh")
+        curves.run_method("load")
+        alarms.refresh()
+
+    files.changed += [draw_anew, lambda: turn_to(view.frame)]
     return view, correction
 
 
