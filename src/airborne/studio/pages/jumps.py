@@ -44,10 +44,11 @@ class Jumps:
 
     async def look(self) -> None:
         """Say how many such frames the run has now."""
-        if self._run is None:
+        if (run := self._run) is None:
             return
         with errors_shown():
-            for what, frames in (await in_thread(doubtful_frames, self._run, says="reading the run")).items():
+            found = await in_thread(doubtful_frames, run, says="reading the run")
+            for what, frames in found.items() if run == self._run else ():
                 self._buttons[what].set_enabled(len(frames) > 0)
                 self._buttons[what].set_text(f"Next {what}: {len(frames) or 'none'}")
 

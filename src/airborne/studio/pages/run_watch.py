@@ -13,7 +13,7 @@ from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY
 from airborne.studio.folder import file_stamp
 from airborne.studio.pages.layout import errors_shown
 
-_LOOK_EVERY_S = 1.0
+_LOOK_EVERY_S = 1.0  # at the files' stamps
 _FILES = (MOTION, JOINTS, SUMMARY)  # of which at least one changes whenever a run does
 
 
