@@ -54,7 +54,7 @@ def test_a_gif_leaves_pictures_out_that_browsers_would_slow_down(run, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "frames", "said"),
-    [("film.avi", {}, "films are .mp4 or .gif"), ("film.mp4", {"first": 40}, "holds frames 0 to 11, none of 40 to 11")],
+    [("film.avi", {}, "films are .mp4 or .gif"), ("film.mp4", {"first": 40}, "has frames 0 to 11, and 40 is after 11")],
 )
 def test_what_cannot_be_filmed_is_one_line(run, tmp_path, name, frames, said):
     with pytest.raises(ResultError, match=said):

@@ -9,13 +9,15 @@ from scipy.spatial.transform import Rotation
 
 from airborne.cameras import read_rig
 from airborne.io.text import read_toml
-from airborne.motion import read_motion
+from airborne.motion import MotionWriter, read_motion
+from airborne.motion.files import read_estimates
 from airborne.run.track import track_trial
+from airborne.tracking.estimate import lost_estimate
 from airborne.trial.file import read_trial
 from tests.support.places import THROWN_CROSS
 from tests.support.studio import MINUTE, at_pixel, fork_studio, go_home, open_page, wait_for_frame, wait_for_still_scene
 
-FRAME, TURNED, LAST, CAMERA, DRAGGED_PX = 3, 4, 6, 1, (16.0, -12.0)
+FRAME, TURNED, LOST, LAST, CAMERA, DRAGGED_PX = 3, 4, 5, 6, 1, (16.0, -12.0)
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +29,16 @@ def folder(tmp_path_factory):
     trial.write_text(f"{trial.read_text()}\nstop = {LAST}\n")
     track_trial(read_trial(trial), folder / "results", pictures=False)
     return folder
+
+
+def lose_frame(path, frame):
+    """Let the body be lost in a frame of a run."""
+    estimates, joints = read_estimates(path), read_motion(path).joints
+    estimates[frame] = lost_estimate(frame, estimates[frame].time_s)
+    path.unlink()
+    with MotionWriter(path, joints) as writer:
+        for each in estimates:
+            writer.append(each)
 
 
 def wait_for_mark(page, mark, u):
@@ -46,8 +58,8 @@ def times_smaller(page):
     }""")
 
 
-def turn_by_hand(page, middle_px):
-    """Drag the end of the body that is farthest from its middle, with Shift."""
+def drag_body(page, middle_px, key=None):
+    """Drag the end of the body that is farthest from its middle, with a key down."""
     script = """([pane, u0, v0]) => {
         const { view } = document.querySelector("canvas.view");
         const points = view.nowItems().filter((item) => item.grab && item.pane === pane).flatMap((item) => item.points);
@@ -57,12 +69,14 @@ def turn_by_hand(page, middle_px):
     arguments = [CAMERA, *map(float, middle_px)]
     page.wait_for_function(script, arg=arguments)
     u, v = page.evaluate(script, arguments)
-    page.keyboard.down("Shift")
+    if key is not None:
+        page.keyboard.down(key)
     page.mouse.move(*at_pixel(page, CAMERA, u, v))
     page.mouse.down()
-    page.mouse.move(*at_pixel(page, CAMERA, u + 8, v + 8), steps=4)
+    page.mouse.move(*at_pixel(page, CAMERA, u + 12, v + 12), steps=4)
     page.mouse.up()
-    page.keyboard.up("Shift")
+    if key is not None:
+        page.keyboard.up(key)
 
 
 def test_a_correction_is_of_its_own_windows_frame_whatever_another_window_shows(folder, tmp_path):
@@ -112,6 +126,7 @@ def drag_joint(page, px):
 def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked_again(folder):
     run = folder / "results"
     before, rig = read_motion(run / "motion.csv"), read_rig(run / "calib.toml")
+    lose_frame(run / "motion.csv", LOST)
     model = read_trial(folder / "trial.toml").model()
     name = model.landmarks[0].name
     u, v = rig.cameras[CAMERA].px_from_world(model.with_pose(before.pose(FRAME)).landmarks[0])
@@ -141,13 +156,23 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         wait_for_frame(page, TURNED)
         later = rig.cameras[CAMERA].px_from_world(model.with_pose(before.pose(TURNED)).landmarks[0])
         wait_for_mark(page, f"{name}|{rig.names[CAMERA]}", later[0])
-        turn_by_hand(page, rig.cameras[CAMERA].px_from_world(before.position[TURNED]))
+        drag_body(page, rig.cameras[CAMERA].px_from_world(before.position[TURNED]), "Shift")
         page.get_by_text(f"body turned, frame {TURNED}").first.wait_for()
         page.get_by_role("button", name="Leave it out").click()  # the first camera, of the frame in view
         page.get_by_text(f"{rig.names[0]} left out of frames {TURNED} to {TURNED}").first.wait_for()
+        assert page.get_by_role("button", name="Next lost: 1").is_enabled()
+        page.keyboard.press("r")
+        wait_for_frame(page, LOST)
+        page.get_by_text(f"Frame {LOST} is lost. The white outline is a guess").wait_for()
+        drag_body(page, rig.cameras[CAMERA].px_from_world(before.position[LOST]))
+        page.get_by_text(re.compile(f"corrected in {rig.names[CAMERA]}, frame {LOST}")).first.wait_for()
         again.click()
-        page.get_by_text("tracked again", exact=True).wait_for(timeout=5 * MINUTE)
-    key, turned = read_toml(folder / "trial.toml")["key"]
+        page.get_by_text(f"frames {FRAME - 2} to {LAST - 1} tracked again; at frame ").wait_for(timeout=5 * MINUTE)
+        page.get_by_role("button", name="Next lost: none").wait_for()
+        label = "document.querySelector('canvas.view').view.shown.overlay.label"
+        page.wait_for_function(f"{label}.endsWith('tracked')")
+    key, turned, found = read_toml(folder / "trial.toml")["key"]
+    assert (found["frame"], list(found)) == (LOST, ["frame", "points_px"])
     assert turned["frame"] == TURNED
     assert read_toml(folder / "trial.toml")["mask"] == [{"camera": rig.names[0], "first": TURNED, "last": TURNED}]
     assert f"{rig.names[0]}: no image at 1 of {LAST} frames" in (run / "summary.json").read_text()

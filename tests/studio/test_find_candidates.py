@@ -55,7 +55,7 @@ def test_candidates_are_pictures_with_a_button_each(folder):
         user.press("candidate 2, 40 %")
         wait_for_frame(page, 2)
         user.press("Use this pose")
-        page.get_by_text("The trial has it.").wait_for()
+        page.get_by_text("The trial begins with this pose.").wait_for()
         with page.expect_popup() as popup:
             user.click(picture)
         popup.value.locator("img").wait_for()

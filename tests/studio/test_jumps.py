@@ -1,5 +1,6 @@
 """In Review a key goes to the next frame in which the body, a joint or a player is in doubt; in a real browser."""
 
+import time
 from dataclasses import replace
 from fractions import Fraction
 
@@ -8,6 +9,7 @@ import pytest
 
 from airborne.motion import MotionWriter, read_motion
 from airborne.motion.files import read_estimates
+from airborne.studio.pages import review
 from airborne.studio.strips import doubtful_frames
 from airborne.tracking import Status
 from tests.support.person_run import write_person_run
@@ -71,15 +73,36 @@ def test_of_frames_that_share_a_point_the_cursor_says_the_least_and_the_greatest
     assert found == ["x 1.000 to 1.250 ± 0.050 m"] * 2 + ["x 2.000 to 2.500 ± ? m"]
 
 
-def test_keys_go_to_the_next_frame_in_doubt_and_back(folder):
-    with fork_studio(folder) as address, open_page(address.replace("/?", "/review?")) as page:
+def choose_run(page, run):
+    """Choose a run in the list."""
+    page.get_by_label("run", exact=True).click()
+    page.get_by_role("option", name=run).click()
+
+
+def wait_for_run(page, run):
+    """Wait until the pictures are those of a run."""
+    page.wait_for_function("run => document.querySelector('canvas.view')?.view?.overlay.includes(`/${run}/`)", arg=run)
+
+
+def slow_down():
+    """Let a run take its time to be opened."""
+    read = review.curve_kinds
+
+    def wait(run):
+        time.sleep(0.5)
+        return read(run)
+
+    review.curve_kinds = wait
+
+
+def test_keys_go_to_the_next_frame_in_doubt_and_back_of_the_run_that_is_chosen(folder):
+    with fork_studio(folder, before=slow_down) as address, open_page(address.replace("/?", "/review?")) as page:
         for run, ways in (
             ("person", [("a", STRAINED), ("r", LOST), ("a", STRAINED), ("Shift+R", LOST)]),
             ("players", [("a", 3), ("a", 7), ("a", 11), ("a", 3), ("Shift+A", 11)]),
         ):
-            page.get_by_label("run", exact=True).click()
-            page.get_by_role("option", name=run).click()
-            page.get_by_text("next uncertain").wait_for()
+            choose_run(page, run)
+            wait_for_run(page, run)
             go_home(page)
             for key, frame in ways:
                 page.keyboard.press(key)
@@ -90,3 +113,18 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back(folder):
         page.wait_for_function(f"({STICKS})() === {2 * 5}")  # of two players, down both legs and across the hips
         assert page.get_by_role("button", name="next uncertain").is_enabled()
         assert not page.get_by_role("button", name="next lost").is_enabled()
+        page.get_by_role("switch", name="Leave cameras out").click()
+        page.get_by_role("button", name="Leave it out").click()
+        page.get_by_text("left out of frames 11 to 11; players are tracked again from the start").wait_for()
+        choose_run(page, "person")
+        page.get_by_text("reading the run").first.wait_for()
+        page.locator("h1").click()  # out of the list
+        page.keyboard.press("r")  # before that run is there
+        wait_for_run(page, "person")
+        wait_for_frame(page, LOST)
+        page.keyboard.press("Home")  # the pictures were not clicked
+        wait_for_frame(page, 0)
+        page.get_by_role("button", name="next lost").press("ArrowRight")
+        wait_for_frame(page, 1)
+        page.get_by_role("button", name="next lost").press(" ")  # which has pressed it
+        wait_for_frame(page, LOST)

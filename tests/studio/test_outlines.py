@@ -70,12 +70,12 @@ def test_another_run_is_drawn_in_its_own_colour_and_said_to_be_as_far_as_it_is(t
     cells[x] = str(float(cells[x]) + 0.25)
     table[row] = ",".join(cells)
     (other / "joints.csv").write_text("\n".join(table) + "\n")
-    assert describe_distance(run, other).endswith("median 0 mm, at most 250 mm, in frame 5")
+    assert describe_distance(run, other).endswith("0 mm apart, the median; at most 250 mm, in frame 5")
     body.mkdir()
     with MotionWriter(body / "motion.csv") as writer:
         writer.append(run_with_gap()[0])
     assert describe_distance(run, body) == "they share no frame"
-    assert describe_distance(body, body) == "roots: median 0 mm, at most 0 mm, in frame 0"
+    assert describe_distance(body, body) == "the bodies' positions are 0 mm apart, the median; at most 0 mm, in frame 0"
 
 
 def test_players_have_colours_by_their_side_of_the_net():

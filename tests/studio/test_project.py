@@ -7,7 +7,8 @@ import pytest
 from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
-from airborne.studio.project import find_trial, list_measurements, read_project, steps
+from airborne.studio.project import find_trial, list_measurements, list_runs, read_project, steps
+from airborne.studio.run_names import check_run_name, next_run_name
 from tests.support.places import THROWN_CROSS
 
 
@@ -72,3 +73,37 @@ def test_measurements_of_a_person_are_found_by_what_is_in_the_files(tmp_path):
 def test_a_path_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(TrialError, match="give a folder of videos"):
         find_trial(tmp_path / "nothing")
+
+
+def test_a_run_is_one_once_a_frame_is_tracked_and_ticked_once_it_is_finished(tmp_path):
+    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    run = folder / "results"
+    run.mkdir()
+    (run / "motion.csv").write_text("frame,time_s\n")
+    assert (states(folder)["Track"], states(folder)["Review"]) == ("needs you", "empty")
+    assert list_runs(folder) == []
+    (run / "motion.csv").write_text("frame,time_s\n0,0.0\n")
+    assert (states(folder)["Track"], states(folder)["Review"]) == ("needs you", "empty")
+    assert list_runs(folder) == [run]
+    (run / "summary.json").write_text("{}")
+    assert (states(folder)["Track"], states(folder)["Review"]) == ("ready", "ready")
+
+
+@pytest.mark.parametrize("name", ["", "../x", "a/b", ".airborne", "x" * 81])
+def test_a_name_that_no_run_can_have_is_refused_and_not_altered(tmp_path, name):
+    with pytest.raises(TrialError, match=r"no slash in it and no dot at its beginning, as results_2"):
+        check_run_name(tmp_path, name)
+
+
+def test_a_run_is_no_file_and_the_next_one_has_a_free_name(tmp_path):
+    (tmp_path / "cam1.mp4").write_bytes(b"0")
+    with pytest.raises(TrialError, match=r"cam1\.mp4 is a file of this folder; give the run another name, as results"):
+        check_run_name(tmp_path, "cam1.mp4")
+    assert check_run_name(tmp_path, "results") == tmp_path / "results"
+    for name in ("results", "results_2", "throw_b"):
+        (tmp_path / name).mkdir()
+    assert [next_run_name(tmp_path, name) for name in ("results", "results_2", "throw_b")] == [
+        "results_3",
+        "results_3",
+        "throw_b_2",
+    ]

@@ -67,5 +67,17 @@ def test_a_run_is_searched_for_doubt_and_compared_with_another(folder):
         assert BESIDE_COLOUR not in page.evaluate(colours)
         page.get_by_label("Compare with").click()
         page.get_by_role("option", name="second").click()
-        page.get_by_text(f"roots: median {1e3 * HIGHER_M:.0f} mm, at most {1e3 * HIGHER_M:.0f} mm").wait_for()
+        page.get_by_text(
+            f"positions are {1e3 * HIGHER_M:.0f} mm apart, the median; at most {1e3 * HIGHER_M:.0f} mm"
+        ).wait_for()
         page.wait_for_function(f"(({colours})() || []).includes('{BESIDE_COLOUR}')")
+        shutil.copytree(folder / "second", folder / "third")
+        page.get_by_label("Compare with").click()
+        page.get_by_role("option", name="third").wait_for()  # as soon as it is there
+        page.keyboard.press("Escape")
+        doubt = {str(UNCERTAIN - 1): "lost", str(UNCERTAIN): "uncertain"}
+        edit_rows(folder / "results" / "motion.csv", lambda row: row.update(status=doubt.get(row["frame"], "tracked")))
+        page.get_by_role("button", name="Next lost: 1").wait_for()  # the file was tracked anew
+        page.get_by_role("button", name="Next lost: 1").click()
+        wait_for_frame(page, UNCERTAIN - 1)
+        page.wait_for_function("document.querySelector('canvas.view').view.shown.overlay.label.endsWith('lost')")

@@ -1,8 +1,8 @@
-"""The method and the last frame of the next run, chosen in the step Track; in a real browser."""
+"""The method, the last frame and the folder of the next run, chosen in the step Track; in a real browser."""
 
 from airborne.io.text import read_toml
 from airborne.trial.settings import PLAYERS_METHODS
-from tests.support.players_trial import write_trial
+from tests.support.players_trial import write_run, write_trial
 from tests.support.studio import fork_studio, open_page, wait_for_frame
 
 N, LAST = 6, 3
@@ -29,3 +29,28 @@ def test_method_and_last_frame_are_written_into_the_trial_and_undone(tmp_path):
         assert method.input_value() == PLAYERS_METHODS[0]
     assert read_toml(trial)["track"] == {"method": PLAYERS_METHODS[0]}
     assert "# a note" in trial.read_text()
+
+
+def test_a_run_is_kept_unless_it_is_to_be_replaced_and_a_name_is_refused_not_altered(tmp_path):
+    trial = write_trial(tmp_path / "block", N)
+    write_run(trial.parent / "results", N)
+    before = (trial.parent / "results" / "joints.csv").read_bytes()
+    with fork_studio(trial) as address, open_page(address.replace("/?", "/track?")) as page:
+        wait_for_frame(page, 0)
+        again, name = page.get_by_role("button", name="Track again"), page.get_by_label("folder of the run")
+        name.fill("../x")
+        page.get_by_text('"../x" cannot be the folder of a run; give a name of').wait_for()
+        again.wait_for(state="hidden")
+        name.fill("results")
+        again.click()
+        page.get_by_role("button", name="Cancel").click()
+        page.get_by_role("dialog").wait_for(state="detached")
+        again.click()
+        page.get_by_role("button", name="Keep it, track into results_2").click()
+        page.wait_for_function("() => document.querySelector('[aria-label=\"folder of the run\"]').disabled")
+        assert name.input_value() == "results_2"
+        page.get_by_role("progressbar", name="progress").wait_for()
+        page.get_by_role("button", name="Stop", exact=True).click()
+        page.wait_for_function("() => !document.querySelector('[aria-label=\"folder of the run\"]').disabled")
+        page.get_by_role("progressbar", name="progress").wait_for(state="hidden")
+    assert (trial.parent / "results" / "joints.csv").read_bytes() == before

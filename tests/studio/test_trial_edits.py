@@ -4,6 +4,7 @@ import pytest
 
 from airborne.errors import TrialError
 from airborne.io.text import parse_toml
+from airborne.studio.pages.mask_cameras import clip_frames
 from airborne.studio.trial_edits import with_cameras, with_clicks, with_key, with_mask, with_table, without_mask
 
 TEXT = """# filmed on a Sunday
@@ -106,3 +107,12 @@ def test_cameras_that_stand_in_one_line_keep_what_is_said_of_them():
     text = 'name = "two"\ncamera = [{ name = "a", video = "a.mp4", drift_ppm = 3.0 }]\nbody = { file = "b.toml" }\n'
     after = parse_toml(with_cameras(text, "two", [{"video": "a.mp4", "offset_s": 0.5}]))
     assert after == {**parse_toml(text), "camera": [{"name": "a", "video": "a.mp4", "drift_ppm": 3.0, "offset_s": 0.5}]}
+
+
+def test_a_camera_is_left_out_of_frames_that_there_are():
+    assert clip_frames(3, 5, 33) == (5, "")
+    assert clip_frames(12, 500, 33) == (33, ", the last there is: 500 was asked for")
+    with pytest.raises(TrialError, match="frames 0 to 33, not 40"):
+        clip_frames(40, 500, 33)
+    with pytest.raises(TrialError, match="exchange them"):
+        clip_frames(5, 3, 33)

@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-_SECONDS_A_LINE = 5.0  # between lines of progress where no terminal shows a bar
+seconds_a_line = 5.0  # between lines of progress where no terminal shows a bar; a program that reads them wants more
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -30,11 +30,11 @@ class _ProgressLines:
     """Progress as plain lines."""
 
     def __init__(self, what: str) -> None:
-        self._what, self._next_s = what, time.monotonic() + _SECONDS_A_LINE
+        self._what, self._next_s = what, time.monotonic() + seconds_a_line
 
     def __call__(self, done: int, total: int | None) -> None:
         if time.monotonic() >= self._next_s:
-            self._next_s = time.monotonic() + _SECONDS_A_LINE
+            self._next_s = time.monotonic() + seconds_a_line
             errors.print(f"{self._what}: {done} of {total or 'unknown'}", markup=False)
 
 

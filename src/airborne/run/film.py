@@ -47,7 +47,10 @@ def write_film(
     last = int(index[-1]) if last is None else last
     rows = np.flatnonzero((index >= first) & (index <= last))
     if not len(rows):
-        raise ResultError(f"{folder} holds frames {index[0]} to {index[-1]}, none of {first} to {last}; give others")
+        what = f"{first} is after {last}" if first > last else f"none lies from {first} to {last}"
+        raise ResultError(
+            f"{folder} has frames {index[0]} to {index[-1]}, and {what}; give a first and a last frame of it"
+        )
     with ExitStack() as stack:
         readers = [stack.enter_context(reader) for reader in _open(folder, len(index))]
         pictures = _draw(readers, rows, time_s=time_s, series=series, width=_WIDEST_PX[path.suffix.lower()])

@@ -74,13 +74,12 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
-    first = {frame: digest for frame, digest in identity["keys"].items() if digest == START}
-    recorded = {"keys": first, "masks": [], **read_record(record)}  # older records have neither
+    recorded = _with_keys(read_record(record), identity)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
     if table == MOTION and changed and set(changed) <= {"keys", "masks"}:
-        masks = [mask for mask in (*recorded["masks"], *identity["masks"]) if _is_changed(mask, recorded, identity)]
-        again = stretches_of(recorded["keys"], identity["keys"], [(mask["first"], mask["last"]) for mask in masks])
+        again = stretches_between(recorded, identity)
         drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
+        (folder / SUMMARY).unlink(missing_ok=True)  # it is not finished until they are tracked again
         write_json(record, identity)
     elif changed:
         differences = "; ".join(_describe_change(name, recorded, identity) for name in changed)
@@ -100,6 +99,19 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
     if name == "settings":
         return "; ".join(f"{key} = {before.get(key)}, now {now.get(key)}" for key in differing)
     return f"other {', '.join(differing)}" if name == "inputs" else f"other {name}"
+
+
+def stretches_between(recorded: dict[str, Any], identity: dict[str, Any]) -> list[tuple[float, float]]:
+    """Return what is tracked again between two identities that differ in keys and masks alone; see `stretches_of`."""
+    recorded = _with_keys(recorded, identity)
+    masks = [mask for mask in (*recorded["masks"], *identity["masks"]) if _is_changed(mask, recorded, identity)]
+    return stretches_of(recorded["keys"], identity["keys"], [(mask["first"], mask["last"]) for mask in masks])
+
+
+def _with_keys(recorded: dict[str, Any], identity: dict[str, Any]) -> dict[str, Any]:
+    """Return a record with keys and masks; older ones have neither, and only the start of what they are beside."""
+    first = {frame: digest for frame, digest in identity["keys"].items() if digest == START}
+    return {"keys": first, "masks": [], **recorded}
 
 
 def _is_changed(mask: dict[str, Any], *identities: Mapping[str, Any]) -> bool:
@@ -174,12 +186,24 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     """Return what two runs share if one can resume the other."""
     settings = {
         "inputs": input_hashes(trial, live=live),
-        "keys": _key_digests(trial),
-        "masks": [mask.model_dump() for mask in trial.mask],
+        **_corrections(trial),
         "settings": trial.track.model_dump(),
         "version": __version__,
     }
     return json.loads(json.dumps(settings))
+
+
+def lacks_corrections(trial: Trial, folder: Path) -> bool:
+    """Say whether a trial has other keys or masks than its run in a folder was tracked with; not without a record."""
+    if not (folder / RUN_RECORD).is_file():
+        return False
+    now = json.loads(json.dumps(_corrections(trial)))
+    recorded = _with_keys(read_record(folder / RUN_RECORD), now)
+    return any(recorded[name] != now[name] for name in now)
+
+
+def _corrections(trial: Trial) -> dict[str, Any]:
+    return {"keys": _key_digests(trial), "masks": [mask.model_dump() for mask in trial.mask]}
 
 
 def _key_digests(trial: Trial) -> dict[str, str]:

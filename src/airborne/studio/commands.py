@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -12,7 +13,10 @@ from pathlib import Path
 
 from airborne.studio.writing import FOLDER
 
-_RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
+_RUN = (
+    "import sys; sys.argv[0] = 'airborne'; from airborne.io import terminal; terminal.seconds_a_line = 0.5; "
+    "from airborne.cli import main; main()"
+)
 _numbers = count(1)  # of the commands: two exports may run at once
 _PATIENCE_S = 10.0  # for a process that was told to stop
 
@@ -23,7 +27,7 @@ class Command:
     def __init__(self, words: Sequence[str], folder: Path) -> None:
         """Start `airborne` with these words in a folder."""
         self.words = tuple(words)
-        self.started_s = time.monotonic()
+        self.started_s, self._began_s = time.monotonic(), time.time()
         self._out: bytes = b""
         self.is_told = False  # a page has shown what came of it
         self._log = folder / FOLDER / f"{words[0]}_{next(_numbers)}.log"
@@ -71,6 +75,19 @@ class Command:
     def progress(self) -> str:
         """Return the last line of what it says beside its output."""
         return self._log.read_text(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
+
+    def how_far(self) -> str:
+        """Return the last line of what it says beside its output; of one that counts, the numbers."""
+        return re.sub(r"^.*: (?=\d+ of \w+$)", "", self.progress())
+
+    def counted(self) -> int:
+        """Return how many frames, or whatever it counts, it said last that it has done; 0 before it said so."""
+        found = re.search(r"(\d+) of \d+$", self.progress())
+        return int(found[1]) if found else 0
+
+    def has_written(self, path: Path) -> bool:
+        """Say whether a file has changed since it began."""
+        return path.is_file() and path.stat().st_mtime >= self._began_s
 
     def stop(self) -> None:
         """Stop it as Ctrl-C does, and wait for its end."""

@@ -141,8 +141,8 @@ def describe_distance(run: Path, other: Path) -> str:
     if far_m.max() < 0:
         return "no frame is tracked in both"
     median, most, frame = np.median(far_m[far_m >= 0]), far_m.max(), int(common[far_m.argmax()])
-    what = "roots" if names == [""] else "joints that are furthest apart"
-    return f"{what}: median {1e3 * median:.0f} mm, at most {1e3 * most:.0f} mm, in frame {frame}"
+    what = "the bodies' positions" if names == [""] else "the joints that differ most"
+    return f"{what} are {1e3 * median:.0f} mm apart, the median; at most {1e3 * most:.0f} mm, in frame {frame}"
 
 
 def _points(run: Path) -> tuple[NDArray[np.int64], dict[str, Array]]:

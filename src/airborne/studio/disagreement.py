@@ -127,8 +127,12 @@ def describe_shifts(shifts: Sequence[EdgeShift]) -> str:
     others = float(np.median([each.far_px for each in ranked[1:]])) if len(ranked) > 1 else 0.0
     is_one = ranked[0].stands_out and ranked[0].far_px > _TIMES_OTHERS * others
     verdict = f"{ranked[0].camera} disagrees" if is_one else "no camera disagrees with all others"
-    each = "; ".join(f"{s.camera} {s.px[0]:+.1f}, {s.px[1]:+.1f} px, sd {s.sd_px:.1f}" for s in ranked)
+    each = "; ".join(f"{s.camera} {_signed(s.px[0])}, {_signed(s.px[1])} px, sd {s.sd_px:.1f}" for s in ranked)
     return f"{verdict}. Edges lie off the outline, right and down: {each}"
+
+
+def _signed(px: float) -> str:
+    return f"{round(px, 1) + 0.0:+.1f}"  # no -0.0
 
 
 def _sample(outline: Sequence[Array], shape: tuple[int, ...], reach: int) -> tuple[Array, Array]:

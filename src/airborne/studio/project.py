@@ -143,7 +143,16 @@ def find_run(folder: Path, name: str) -> Path | None:
 
 def _is_run(path: Path) -> bool:
     is_folder = path.is_dir() and path.name != FOLDER and not path.is_symlink()
-    return is_folder and any((path / name).is_file() for name in (MOTION, JOINTS))
+    return is_folder and any(_holds_a_row(path / name) for name in (MOTION, JOINTS))
+
+
+def _holds_a_row(table: Path) -> bool:
+    """Say whether a table has a whole row below its header: the first frame has been tracked."""
+    try:
+        with table.open("rb") as lines:
+            return bool(lines.readline()) and lines.readline().endswith(b"\n")
+    except OSError:
+        return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,15 +222,17 @@ def _start_state(project: Project) -> tuple[StepState, str]:
 def _run_steps(project: Project) -> Iterator[StudioStep]:
     runs = list_runs(project.folder)
     is_prepared = all(project.table(name) for name in ("calibration", "body"))
-    if runs:
-        yield StudioStep("Track", "/track", "ready", runs[0].name)
+    finished = [run for run in runs if (run / SUMMARY).is_file()]
+    if finished:
+        yield StudioStep("Track", "/track", "ready", finished[0].name)
+    elif runs:
+        yield StudioStep("Track", "/track", "needs you", f"{runs[0].name} is not finished")
     else:
         yield StudioStep("Track", "/track", "needs you" if is_prepared else "empty", "follow the body")
-    yield StudioStep("Review", "/review", "ready" if runs else "empty", runs[0].name if runs else "no run yet")
+    yield StudioStep("Review", "/review", "ready" if finished else "empty", runs[0].name if runs else "no run yet")
     files = sorted(path.name for path in project.folder.glob("digitised_*_*[0-9].csv"))  # not the paths of joints
     state: StepState = "ready" if files else "empty"
     yield StudioStep("Digitise", "/digitise", state, files[-1] if files else "points by hand, to compare")
-    finished = [run for run in runs if (run / SUMMARY).is_file()]
     reports = [run for run in finished if (run / REPORT).is_file()]
     yield StudioStep(
         "Results",

@@ -11,11 +11,12 @@ from typing import Any
 from airborne.body import BodyModel
 from airborne.body.files import read_body
 from airborne.cameras import Rig, read_rig
-from airborne.errors import ResultError
+from airborne.errors import ResultError, count
 from airborne.motion import PlayersMotion
 from airborne.motion.rows import MotionRows, read_rows
 from airborne.motion.run_folder import BODY, CALIBRATION, JOINTS, MOTION, read_players_run
 from airborne.studio.folder import file_stamp
+from airborne.trial.file import Trial
 
 _MOST_KEPT = 8  # runs
 _rows: OrderedDict[Path, tuple[Any, MotionRows]] = OrderedDict()  # run -> stamp of its file, and what was read then
@@ -72,3 +73,17 @@ def _read_rig(path: Path, stamp: Any) -> Rig:
 @lru_cache(maxsize=2)  # of 20 players, 100 MB each
 def _read_players(run: Path, stamp: Any) -> PlayersMotion:
     return read_players_run(run)
+
+
+def count_frames(trial: Trial, n_images: int) -> int:
+    """Return how many frames a run of a trial has in all; its videos have this many."""
+    track = trial.track
+    stop = n_images if track.stop is None else min(n_images, track.stop)
+    return len(range(trial.start.frame, stop, track.every))
+
+
+def describe_progress(n_done: int, n_frames: int) -> str:
+    """Say how far a run is that goes on."""
+    if n_done < n_frames:
+        return f"{n_done} of {count(n_frames, 'frame')}" if n_done else "opening videos"
+    return f"{count(n_frames, 'frame')} tracked, writing tables and report"

@@ -6,6 +6,8 @@ import frames from "/parts/view_frames.js";
 const GRAB_PX = 9; // on the screen: how near a mark must be to be grabbed
 const STILL_PX = 3; // a pointer that moves less has clicked
 const GAP = 4; // between pictures
+const TAKES_KEYS = "canvas.view, input, select, textarea, [role=dialog], [role=listbox], [role=menu], [role=radiogroup], [role=tablist]";
+const PRESSED = "button, a, [role=switch], [role=checkbox]"; // by Space
 
 export default {
   template: `<canvas class="view" tabindex="0" role="img" :aria-label="label"></canvas>`,
@@ -44,6 +46,7 @@ export default {
       this.canvas.addEventListener(name, this["on_" + name]);
     this.onOther = (event) => event.detail.from !== this && !this.apart && this.go(event.detail.frame, true);
     window.addEventListener("airborne-frame", this.onOther);
+    window.addEventListener("keydown", this.onPageKey);
     this.sizes = new ResizeObserver(() => this.draw());
     this.sizes.observe(this.canvas);
     this.go(this.frame || 0, true);
@@ -51,6 +54,7 @@ export default {
   unmounted() {
     this.sizes.disconnect();
     window.removeEventListener("airborne-frame", this.onOther);
+    window.removeEventListener("keydown", this.onPageKey);
   },
   watch: {
     marks() { this.dragged = null; this.live = null; this.draw(); },
@@ -205,7 +209,13 @@ export default {
       const { pane } = this.place(event);
       if (pane >= 0 && !this.picking) { this.zooms[pane] = { scale: 1, u: 0, v: 0 }; this.draw(); }
     },
+    onPageKey(event) { // wherever the focus is, unless what has it takes the key itself
+      const { target } = event, isTaken = target.closest?.(TAKES_KEYS) || document.querySelector(".q-dialog");
+      if (event.defaultPrevented || this.apart || isTaken || (event.key === " " && target.closest?.(PRESSED))) return;
+      this.on_keydown(event);
+    },
     on_keydown(event) {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
       const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
       const mark = (this.marks || []).find((each) => each.id === this.selected && each.id);
       if (mark && event.key in arrows) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from inspect import isawaitable
 from typing import Any, TypedDict
@@ -11,6 +12,8 @@ from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
 from airborne.studio.pictures import ShownTrial
+
+_PATIENCE_S = 5.0  # with a browser that is busy
 
 
 class Mark(TypedDict, total=False):
@@ -105,6 +108,12 @@ class CameraViews(Element, component="view.js", default_classes="view"):
     @property
     def frame(self) -> int:
         """The frame in view here; another window's is its own."""
+        return self._frame
+
+    async def wanted(self) -> int:
+        """Return the frame that was asked for last here, whose pictures may be on their way."""
+        with suppress(TimeoutError):
+            return int(await self.run_method("wantedFrame", timeout=_PATIENCE_S) or 0)
         return self._frame
 
     def _listen(self, name: str, handler: Callable[..., Any] | None, read: Callable[[dict], tuple]) -> None:

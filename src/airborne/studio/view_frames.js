@@ -15,6 +15,7 @@ export default {
     }
   },
   show(frame) { this.go(frame); },
+  wantedFrame() { return this.wanted; },
   lead(frame, anew) { // as `show`, while nobody has gone elsewhere since it led last
     const follows = anew || this.wanted === this.led;
     this.led = frame;

@@ -2,7 +2,7 @@
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#6600cc"];
 const RANKS = ["tracked", "uncertain", "unknown", "lost"]; // of a joint: unknown is what no picture shows
 const STATUS = { tracked: "#009e73", uncertain: "#e69f00", unknown: "#5d666f", lost: "#d55e00" };
-const STRIP = 12, ROW = 10, LEGIBLE = 8, MOST_NAMES = 6, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 18, STEP = 16, FONT = "11px system-ui, sans-serif";
+const STRIP = 12, ROW = 10, LEGIBLE = 8, MOST_NAMES = 6, LEFT = 58, RIGHT = 10, TOP = 20, BOTTOM = 32, STEP = 16, FONT = "11px system-ui, sans-serif";
 
 // data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. {is_thinned}: two rows in a
 // row hold the least and the greatest of the frames from the first's to the next but one. What another run has,
@@ -48,6 +48,7 @@ function drawStill(pen, box, data) {
   const others = data.beside ? data.beside.series : [];
   const [low, high] = rangeOf([...series, ...others]), y = (value) => bottom - ((value - low) / (high - low)) * height;
   drawAxes(pen, low, high, y, box.width, series.length ? series[0].unit : "");
+  drawTimes(pen, data, x, TOP, box.height - BOTTOM, box.width - 4);
   series.forEach((each, k) => drawCurve(pen, each, COLOURS[k % COLOURS.length], frame, x, y));
   pen.save();
   pen.beginPath();
@@ -109,8 +110,7 @@ function rangeOf(series) {
 function drawAxes(pen, low, high, y, width, unit) {
   pen.font = FONT;
   pen.textAlign = "right";
-  const rough = (high - low) / 4, power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((each) => each * power >= rough);
+  const step = stepOf((high - low) / 4);
   for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
     pen.fillStyle = "#5d666f";
     pen.fillText(`${Number(value.toPrecision(6))} ${unit}`, LEFT - 6, y(value) + 4);
@@ -120,6 +120,30 @@ function drawAxes(pen, low, high, y, width, unit) {
     pen.lineTo(width - RIGHT, y(value));
     pen.stroke();
   }
+}
+
+// Lines at round times over the curves, and below all strips how many seconds each is.
+function drawTimes(pen, { frame, time_s }, x, top, bottom, right) {
+  const step = stepOf((time_s.at(-1) - time_s[0]) / 8);
+  pen.textAlign = "center";
+  for (let k = 1, at = Math.ceil(time_s[0] / step); step > 0 && at * step <= time_s.at(-1); at++) {
+    while (k < frame.length - 1 && time_s[k] < at * step) k++;
+    const share = k < frame.length ? (at * step - time_s[k - 1]) / (time_s[k] - time_s[k - 1]) : 0;
+    const place = x(frame[k - 1] + (share ? share * (frame[k] - frame[k - 1]) : 0));
+    pen.fillStyle = "#5d666f";
+    const text = `${Number((at * step).toPrecision(6))} s`;
+    pen.fillText(text, Math.min(place, right - pen.measureText(text).width / 2), bottom + 12);
+    pen.strokeStyle = "#eceff1";
+    pen.beginPath();
+    pen.moveTo(place, top);
+    pen.lineTo(place, bottom + 2);
+    pen.stroke();
+  }
+}
+
+function stepOf(rough) { // the next 1, 2, 5 or 10 of its power of ten; 0 of nothing
+  const power = 10 ** Math.floor(Math.log10(rough));
+  return rough > 0 ? power * [1, 2, 5, 10].find((each) => each * power >= rough) : 0;
 }
 
 function drawCurve(pen, { value, sd }, colour, frame, x, y) {

@@ -27,13 +27,17 @@ class CommandWatch:
         words: str,
         codes: Sequence[int] = (0,),
         again: bool = False,
+        how_far: Callable[[], str] | None = None,
     ) -> None:
         """Look at the session's command of a name; `words` say what it does, `codes` with which it ends well.
+
+        `how_far` says how far it is, in the place of what the command says of itself.
 
         `on_end` is called with a command that ends well; what another says is shown. With `again` that goes for one
         that had ended before the page was opened, too.
         """
-        self.session, self.name, self._on_end, self._words, self._codes = session, name, on_end, words, codes
+        self.session, self.name, self._on_end, self.words, self._codes = session, name, on_end, words, codes
+        self._how_far = how_far
         self._ended = None if again or self.is_running else self.command
         self.buttons: list[ui.button] = []  # that wait while it runs
         self.says = ui.label().classes("small soft")
@@ -84,7 +88,7 @@ class CommandWatch:
         for button in self.buttons:
             button.set_enabled(not is_running)
         if command is not None and is_running:
-            line = command.progress().removeprefix(f"{self._words}: ")
-            self.says.set_text(f"{self._words}, {command.seconds:.0f} s{': ' if line else ''}{line}")
+            line = command.how_far() if self._how_far is None else self._how_far()
+            self.says.set_text(f"{self.words}, {command.seconds:.0f} s{': ' if line else ''}{line}")
         elif command is not self._ended:
             self.says.set_text("")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,37 +11,45 @@ from nicegui import ui
 from airborne.body import Pose
 from airborne.cameras import Camera
 from airborne.errors import TrialError
+from airborne.run.folder import lacks_corrections
 from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
+from airborne.studio.ghosts import ghost_of
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import errors_shown, in_thread
 from airborne.studio.pages.mask_cameras import MaskPanel
 from airborne.studio.pages.pose_hand import PoseHand
+from airborne.studio.pages.run_watch import RunWatch
 from airborne.studio.pictures import ShownTrial
-from airborne.studio.runs import count_rows, run_body, run_rig, run_rows
+from airborne.studio.runs import count_frames, count_rows, describe_progress, run_body, run_rig, run_rows
 from airborne.studio.session import Session
+from airborne.studio.starts import POSE_COLOUR
+from airborne.studio.tracked_again import RunBefore, describe_tracked_again, name_frames
 from airborne.studio.trial_edits import with_clicks, with_key
-from airborne.studio.view import CameraViews, Curves, Drag, Mark
+from airborne.studio.view import CameraViews, Drag, Mark
 from airborne.trial.keys import KeyTable
 from airborne.trial.settings import KEY_METHODS
 from airborne.types import Array
 
-_LOOK_EVERY_S = 1.0  # at a run that is tracked again
-_JOINT_COLOUR, _CLICK_COLOUR = "#ffffff", "#f0e442"
+_JOINT_COLOUR, _CLICK_COLOUR, _GHOST_COLOUR = "#ffffff", "#f0e442", "#ffffff"
+_HINT = (
+    "Drag a joint, or the body by its outline, to where the pictures show it; Shift turns it. Then track again around "
+    "it."
+)
 
 
 class Correction:
     """One window's corrections of a run of one body; they are written into the trial as they are made."""
 
-    def __init__(self, session: Session, shown: ShownTrial, folder: Path) -> None:
+    def __init__(self, session: Session, shown: ShownTrial, files: RunWatch) -> None:
         """Begin with nothing to grab, until the switch is on."""
-        self.session, self.shown, self.folder = session, shown, folder
+        self.session, self.shown, self.folder, self._files = session, shown, files.folder, files
         self.view: CameraViews | None = None
-        self.curves: Curves | None = None
-        self._n_rows = count_rows(folder)[0]  # that are shown
-        cameras = run_rig(folder).select(shown.names).cameras
-        self.hand = PoseHand(run_body(folder), cameras, lambda pose: self._marks(pose, {}))
-        self._seen = self._tracked = self._held()  # when this window looked last; when it last tracked
+        self._before: RunBefore | None = None  # the run when this window tracked it again
+        cameras = run_rig(self.folder).select(shown.names).cameras
+        self.hand = PoseHand(run_body(self.folder), cameras, lambda pose: self._marks(pose, {}))
+        self._seen = self._asked = self._held()  # when this window looked last, and tracked last
+        self._tracked: tuple[Any, Any] | None = self._seen  # what the run was tracked with; None: something else
 
     @property
     def frame(self) -> int:
@@ -60,31 +67,52 @@ class Correction:
         """Lay out the button that tracks again, and what there is to say: where the pictures do not shrink for it."""
         with ui.element("div").classes("row-line"):
             self.again = ui.button("Track again around it", on_click=self.track).props("unelevated")
-            self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking")
+            self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking", how_far=self._how_far)
             self.watch.buttons = [self.again]
-        self.again.set_visibility(False)
-        ui.timer(_LOOK_EVERY_S, self.look)
+        self._find_untracked()
+        self.hint = ui.label().classes("small")
+        self.hint.bind_visibility_from(self.switch, "value")
 
-    async def look(self) -> None:
-        """Show what the run has tracked again since, while it goes on."""
-        if self.watch.is_running:
-            n_rows, _ = await in_thread(count_rows, self.folder, says="")
-            if n_rows != self._n_rows:
-                self._n_rows = n_rows
-                self._refresh()
+    def _find_untracked(self) -> None:
+        """Offer to track again where the trial has corrections that the run has not been tracked with."""
+        project = self.session.project()
+        with errors_shown():
+            if not project.mistake and project.table("start") and lacks_corrections(project.trial(), self.folder):
+                self._tracked = None
+                self.watch.says.set_text("the trial has corrections that this run was tracked without")
+        self.again.set_visibility(self._tracked is None)
 
-    def _refresh(self) -> None:
-        if self.view is not None and self.curves is not None:
-            self.view.run_method("refresh")
-            self.curves.run_method("load")
+    def _how_far(self) -> str:
+        """Say how many frames the run has while it is tracked again."""
+        command = self.watch.command
+        if command is None or self._before is None or not self._before.is_changed(self.folder):
+            return describe_progress(0, 1)
+        n_frames = count_frames(self.session.project().trial(), len(self.shown.clock))
+        return describe_progress(max(count_rows(self.folder)[0], command.counted()), n_frames)
 
     async def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""
         if self.view is None:
             return
         with errors_shown():
-            await self.hand.place_next(run_rows(self.folder).pose(frame) if self.switch.value else None)
+            pose, self.hand.colour, hint = self._pose(frame) if self.switch.value else (None, POSE_COLOUR, "")
+            await self.hand.place_next(pose)
+            self.hint.set_text(hint)
             self._show(frame)
+
+    def _pose(self, frame: int) -> tuple[Pose | None, str, str]:
+        """Return what can be grabbed in a frame, its colour, and what there is to do."""
+        rows = run_rows(self.folder)
+        if rows.row(frame) is None:
+            if self.watch.is_running:
+                return None, POSE_COLOUR, "This frame is tracked again."
+            return None, POSE_COLOUR, f"The run has {name_frames(rows.index)}; go to one of them to correct it."
+        if (pose := rows.pose(frame)) is not None:
+            return pose, POSE_COLOUR, _HINT
+        ghost = ghost_of(rows, frame)
+        if ghost is None:
+            return None, POSE_COLOUR, "The body is lost in all frames of the run; correct the first pose."
+        return ghost[0], _GHOST_COLOUR, _describe_ghost(frame, ghost[1])
 
     async def reread(self) -> None:
         """Show what the trial holds now: undo or another window may have changed it."""
@@ -107,7 +135,8 @@ class Correction:
         if self.view is not None:
             is_on = bool(self.switch.value)
             marks = self._marks(self.hand.pose, self._clicks_of_key(frame)) if is_on else []
-            self.view.show_over(marks, [*self.masks.items(frame), *self.hand.items()])
+            items = [*self.masks.items(frame), *self.hand.items()]
+            self.view.show_over(marks, sorted(items, key=lambda item: "text" in item))  # which lie above
 
     def move(self, mark: str, u: float, v: float) -> None:
         """Write where a joint is as a click of the frame's key."""
@@ -127,8 +156,11 @@ class Correction:
             self._write_turn(drag.frame, pose)
         else:
             names = landmarks_of_grip(self.hand.model, grip)
-            clicks = landmarks_px(self.hand.model, pose, camera, names)
-            self._write(drag.frame, dict(clicks), camera.name, self.hand.model.segments[grip.segment].name)
+            clicks = dict(landmarks_px(self.hand.model, pose, camera, names))
+            if clicks:
+                self._write(drag.frame, clicks, camera.name, self.hand.model.segments[grip.segment].name)
+            else:  # none is in this picture, or the thing has none
+                self._write_place(drag.frame, pose)
 
     def _write_turn(self, frame: int, pose: Pose) -> None:
         """Write the body's orientation into the frame's key."""
@@ -137,6 +169,12 @@ class Correction:
         values = {**others, "quaternion_xyzw": [x, y, z, w]}
         sd = _default_sd("sd_deg")
         self._edit(frame, lambda text: with_key(text, frame, values), f"body turned, frame {frame}", f", ± {sd:g}°")
+
+    def _write_place(self, frame: int, pose: Pose) -> None:
+        """Write the body's place into the frame's key."""
+        values = {"position_m": [round(float(each), 4) for each in pose.world_from_root.translation]}
+        sd_mm = 1e3 * _default_sd("sd_m")
+        self._edit(frame, lambda text: with_key(text, frame, values), f"body moved, frame {frame}", f", ± {sd_mm:g} mm")
 
     def _write(self, frame: int, clicks: dict[str, Array], camera: str, what: str) -> None:
         """Write where a camera sees landmarks of the body into the frame's key."""
@@ -169,15 +207,24 @@ class Correction:
 
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""
-        self._tracked = self._held()
+        self._asked = self._held()
+        with errors_shown():
+            self._before = RunBefore.of(self.folder)
         self.watch.start("track", self.session.path.name, "-o", self.folder.name, "--resume")
-        self.again.set_visibility(False)
 
     async def show_anew(self, command: Command) -> None:
         """Show what came of it."""
-        self.watch.says.set_text("tracked again")
-        self._refresh()
-        await self.turn_to(self.frame)
+        if self.folder.name not in command.words:  # another run
+            return
+        await self._files.look()
+        self._tracked = self._asked
+        self.again.set_visibility(self._held() != self._tracked)
+        before, text = self._before, "tracked again"
+        with errors_shown():
+            if before is not None:
+                trial = self.session.project().trial()
+                text = await in_thread(describe_tracked_again, before, self.folder, trial, says="reading the run")
+        self.watch.says.set_text(text)
 
     def _clicks_of_key(self, frame: int) -> dict[str, Any]:
         """Return the clicks that the frame's key holds: landmark -> camera -> (2,) [px]."""
@@ -205,6 +252,14 @@ class Correction:
                     colour, label = (_CLICK_COLOUR, landmark.name) if camera.name in own else (_JOINT_COLOUR, "")
                     marks.append({**mark, "label": label, "colour": colour})
         return marks
+
+
+def _describe_ghost(frame: int, where: str) -> str:
+    """Say what a body in a frame in which it is lost is."""
+    return (
+        f"Frame {frame} is lost. The white outline is a guess, {where}. Drag it to where the pictures show the body, "
+        "in two of them if you can; Shift turns it. Then track again around it."
+    )
 
 
 def _default_sd(key: str) -> float:

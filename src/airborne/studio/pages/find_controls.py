@@ -77,7 +77,11 @@ class FindControls:
         if self.start is None:
             self.note.set_text("")
         else:
-            state = "The trial has it." if has_start(self.session, self.start) else f"Not yet used: press {self.use}."
+            state = (
+                "The trial begins with this pose."
+                if has_start(self.session, self.start)
+                else f"Not yet used: press {self.use}."
+            )
             self.note.set_text(f"{self.says} {state}")
 
     def _list_candidates(self) -> None:

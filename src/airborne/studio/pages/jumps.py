@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 from nicegui import ui
@@ -10,6 +12,7 @@ from nicegui.events import KeyEventArguments
 
 from airborne.studio.pages.layout import complain, errors_shown, in_thread
 from airborne.studio.strips import doubtful_frames
+from airborne.studio.view import CameraViews
 
 _KEYS = {"a": "uncertain", "r": "lost"}  # as amber and red
 
@@ -17,11 +20,12 @@ _KEYS = {"a": "uncertain", "r": "lost"}  # as amber and red
 class Jumps:
     """One window's buttons and keys, for the run in view."""
 
-    def __init__(self, frame: Callable[[], int]) -> None:
-        """Begin without a run; `frame` says which one the window shows."""
-        self._frame, self._latest = frame, (-1, -1)  # where the latest jump came from, and went
+    def __init__(self) -> None:
+        """Begin without a run."""
+        self.view: CameraViews | None = None  # of the run
         self._run: Path | None = None
         self._buttons: dict[str, ui.button] = {}
+        self._one_at_a_time = asyncio.Lock()  # a key while another run is opened is meant for that
 
     def build(self) -> None:
         """Lay the buttons out, and listen to the keys."""
@@ -30,12 +34,23 @@ class Jumps:
             button = ui.button(f"Next {what}", on_click=lambda _, to=what: self.go(to)).props("flat")
             self._buttons[what] = button.tooltip(f"the body, a joint or a player; key {key.upper()}")
 
-    async def turn_to(self, run: Path) -> None:
-        """Jump among the frames of this run from now on."""
-        self._run = run
+    @asynccontextmanager
+    async def turning_to(self, run: Path) -> AsyncIterator[None]:
+        """Jump among the frames of this run from now on, as soon as it is laid out; that is done inside."""
+        async with self._one_at_a_time:
+            self._run = run
+            await self.look()
+            yield
+
+    async def look(self) -> None:
+        """Say how many such frames the run has now."""
+        if (run := self._run) is None:
+            return
         with errors_shown():
-            for what, frames in (await in_thread(doubtful_frames, run, says="reading the run")).items():
+            found = await in_thread(doubtful_frames, run, says="reading the run")
+            for what, frames in found.items() if run == self._run else ():
                 self._buttons[what].set_enabled(len(frames) > 0)
+                self._buttons[what].set_text(f"Next {what}: {len(frames) or 'none'}")
 
     async def press(self, event: KeyEventArguments) -> None:
         """Jump by key."""
@@ -45,17 +60,14 @@ class Jumps:
 
     async def go(self, what: str, *, is_back: bool = False) -> None:
         """Show the next such frame after the one in view, or the first; or the one before, or the last."""
-        if self._run is None:
-            return
-        with errors_shown():
-            frames = (await in_thread(doubtful_frames, self._run, says="reading the run"))[what]
-            if not len(frames):
-                complain(f"in no frame of this run is anything {what}")
+        async with self._one_at_a_time:
+            if self._run is None or self.view is None:
                 return
-            shown = self._frame()
-            now = self._latest[1] if shown == self._latest[0] else shown  # the next key may come before the pictures
-            left = frames[frames < now][::-1] if is_back else frames[frames > now]
-            frame = int(left[0] if len(left) else frames[-1 if is_back else 0])
-            self._latest = shown, frame
-            detail = f"{{detail: {{frame: {frame}, from: null}}}}"
-            ui.run_javascript(f'window.dispatchEvent(new CustomEvent("airborne-frame", {detail}))')
+            with errors_shown():
+                frames = (await in_thread(doubtful_frames, self._run, says="reading the run"))[what]
+                if not len(frames):
+                    complain(f"in no frame of this run is anything {what}")
+                    return
+                now = await self.view.wanted()
+                left = frames[frames < now][::-1] if is_back else frames[frames > now]
+                self.view.go(int(left[0] if len(left) else frames[-1 if is_back else 0]))

@@ -38,6 +38,7 @@ class Making:
 
     def export(self) -> None:
         """Start `airborne export`."""
+        self._watch.words = "exporting"
         with errors_shown():
             self._watch.start("export", self._folder.name, *(f"--{kind}" for kind in self._formats.value))
 
@@ -46,6 +47,7 @@ class Making:
         path = f"{self._folder.name}/{FOLDERS[2]}/film.{self._kind.value}"
         ends = [("--first", self._first.value), ("--last", self._last.value)]
         words = [word for name, value in ends if value is not None for word in (name, str(int(value)))]
+        self._watch.words = "drawing the film"
         self._watch.start("film", self._folder.name, "-o", path, *words)
 
     def show_files(self, command: Command) -> None:

@@ -13,7 +13,7 @@ from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_mask, without_mask
-from airborne.studio.view import Item
+from airborne.studio.view import CameraViews, Item
 
 _VEIL = "#16191dcc"  # over a picture that is left out
 _KEYS = {"camera", "first", "last"}
@@ -30,9 +30,9 @@ class MaskPanel:
         with ui.element("div").classes("row-line") as self.area:
             self.camera = ui.select(shown.names, label="camera", value=shown.names[0])
             self.camera.props("outlined dense options-dense").style("min-width: 150px")
-            last = len(shown.clock) - 1
+            self._end = len(shown.clock) - 1  # the last frame
             self.first, self.last = (
-                ui.number(label, min=0, max=last, precision=0).props("outlined dense").style("width: 110px")
+                ui.number(label, min=0, max=self._end, precision=0).props("outlined dense").style("width: 110px")
                 for label in ("from frame", "to frame")
             )
             ui.button("Leave it out", on_click=self.add).props("outline")
@@ -53,7 +53,7 @@ class MaskPanel:
             if name in left_out:
                 corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]
                 items.append({"pane": pane, "points": corners, "closed": True, "fill": _VEIL})
-                items.append({"pane": pane, "points": [[0.45 * width, 0.5 * height]], "text": "left out"})
+                items.append({"pane": pane, "points": [[0.04 * width, 0.94 * height]], "text": "left out"})
         return items
 
     def add(self) -> None:
@@ -62,9 +62,8 @@ class MaskPanel:
         first, last = (self._frame_of() if number is None else int(number) for number in numbers)
         camera = str(self.camera.value)
         with errors_shown():
-            if last < first:
-                raise TrialError(f"the last frame, {last}, lies before the first, {first}; exchange them")
-            what = f"{camera} left out of frames {first} to {last}"
+            last, note = clip_frames(first, last, self._end)
+            what = f"{camera} left out of frames {first} to {last}{note}"
             self._edit(lambda text: with_mask(text, camera, first, last), what)
 
     def remove(self, number: int, camera: str) -> None:
@@ -82,3 +81,53 @@ class MaskPanel:
             text = f"{mask['camera']}: {mask['first']} to {mask['last']}  ✕"
             button = ui.button(text, on_click=partial(self.remove, number, str(mask["camera"])))
             button.props("flat dense no-caps").tooltip("use it again")
+
+
+class PlayersMasks:
+    """What can be corrected of a run of players: cameras are left out, and it is tracked again from its start."""
+
+    def __init__(self, session: Session, shown: ShownTrial) -> None:
+        """Begin with nothing that is shown, until the switch is on."""
+        self.session, self.shown = session, shown
+        self.view: CameraViews | None = None
+
+    def build(self) -> None:
+        """Lay out the switch, and what leaves a camera out."""
+        self._switch = ui.switch("Leave cameras out", on_change=lambda: self.turn_to(self._frame))
+        self._masks = MaskPanel(self.session, self.shown, lambda: self._frame, self._note_change)
+        self._masks.area.bind_visibility_from(self._switch, "value")
+
+    def build_watch(self) -> None:
+        """Lay out the line that says what to do then."""
+        self._says = ui.label().classes("small soft")
+        self._says.bind_visibility_from(self._says, "text")
+
+    @property
+    def _frame(self) -> int:
+        return self.session.frame if self.view is None else self.view.frame
+
+    def turn_to(self, frame: int) -> None:
+        """Show what is left out of a frame."""
+        if self.view is not None:
+            self.view.show_over((), self._masks.items(frame) if self._switch.value else ())
+
+    async def reread(self) -> None:
+        """Show what the trial holds now."""
+        self._masks.list.refresh()
+        self.turn_to(self._frame)
+
+    def _note_change(self, what: str) -> None:
+        self._says.set_text(f"{what}; players are tracked again from the start, in the step Track")
+        self.turn_to(self._frame)
+
+
+def clip_frames(first: int, last: int, end: int) -> tuple[int, str]:
+    """Return the last frame of a stretch of videos that end with a frame, and what to say where that is another.
+
+    Raises TrialError for a stretch that holds none of their frames.
+    """
+    if last < first:
+        raise TrialError(f"the last frame, {last}, lies before the first, {first}; exchange them")
+    if not 0 <= first <= end:
+        raise TrialError(f"the videos have frames 0 to {end}, not {first}; give a first frame of them")
+    return (last, "") if last <= end else (end, f", the last there is: {last} was asked for")

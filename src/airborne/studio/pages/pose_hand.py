@@ -30,6 +30,7 @@ class PoseHand:
         """Begin without a pose; `marks` are those of a pose while it is dragged, None: as they are."""
         self.model, self.cameras, self._marks = model, tuple(cameras), marks
         self.pose: Pose | None = None
+        self.colour = POSE_COLOUR  # of its outline
         self.before: list[dict[str, Any]] = []  # the outline of another pose, beside it
         self._taken: Pose | None = None  # the pose when the drag began
         self._grip: Grip | None = None
@@ -55,7 +56,7 @@ class PoseHand:
         """Return the pose's outline, where it can be grabbed."""
         if self.pose is None:
             return []
-        own = outline_items(self.model.with_pose(self.pose), self.cameras, POSE_COLOUR, grab=True)
+        own = outline_items(self.model.with_pose(self.pose), self.cameras, self.colour, grab=True)
         return [*self.before, *own]
 
     async def follow(self, view: CameraViews, drag: Drag) -> bool:
@@ -86,7 +87,7 @@ class PoseHand:
             return True, (None, None)
         step = 2 if max(each.size[0] for each in self.cameras) > _FINE_PX else 1
         posed = self.model.with_pose(self.pose)
-        return True, (self._marks(self.pose), outline_items(posed, self.cameras, POSE_COLOUR, step=step, grab=True))
+        return True, (self._marks(self.pose), outline_items(posed, self.cameras, self.colour, step=step, grab=True))
 
     def _take(self, drag: Drag, camera: Camera) -> Grip | None:
         assert self.pose is not None

@@ -18,7 +18,9 @@ from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR, leg_rods, player_colours, sides_m
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.jumps import Jumps
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.mask_cameras import PlayersMasks
+from airborne.studio.pages.run_watch import RunWatch
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.runs import run_body, run_players, run_rig, run_rows
@@ -47,7 +49,16 @@ async def review_page(session: Session) -> None:
         def frame() -> int:
             return session.frame if view is None else view.frame
 
-        jumps = Jumps(frame)
+        jumps = Jumps()
+
+        async def list_anew() -> None:
+            """Offer the runs that there are now."""
+            found = [each.name for each in list_runs(session.folder)]
+            names[:] = found if choice.value in found else [choice.value, *found]
+            if choice.options != names:
+                choice.set_options(list(names))
+                beside.set_options(["", *(name for name in names if name != choice.value)])
+                beside.set_visibility(len(names) > 1)
 
         async def change() -> None:
             nonlocal view
@@ -56,15 +67,19 @@ async def review_page(session: Session) -> None:
                 beside.set_options(["", *others], value="")  # which calls this again
                 return
             beside.set_options(["", *others])
-            await jumps.turn_to(session.folder / choice.value)
-            content.clear()
-            with content:
-                folder = session.folder / choice.value
-                view, correction = await _show_run(session, shown, folder, beside.value, frame())
-            changed[:] = [] if correction is None else [correction.reread]
+            folder = session.folder / choice.value
+            blame.set_visibility(not holds_players(folder))  # which have no outline to compare
+            async with jumps.turning_to(folder):
+                content.clear()
+                with content:
+                    files = RunWatch(folder)
+                    view, correction = await _show_run(session, shown, files, beside.value, frame())
+                    files.changed.append(jumps.look)
+                jumps.view = view
+                changed[:] = [list_anew, correction.reread]
 
         with ui.element("div").classes("row-line"):
-            choice = ui.select(names, label="run", value=names[0], on_change=change)
+            choice = ui.select(list(names), label="run", value=names[0], on_change=change)
             choice.props("outlined dense options-dense").style("min-width: 180px")
             beside = ui.select([""], label="Compare with", value="", on_change=change)
             beside.props("outlined dense options-dense").style("min-width: 150px")
@@ -80,9 +95,6 @@ async def review_page(session: Session) -> None:
 
 async def _blame(session: Session, shown: ShownTrial, folder: Path, frame: int, says: ui.label) -> None:
     """Say which camera disagrees with the run about the frame in view."""
-    if holds_players(folder):
-        complain("players have no outline to compare; this is for a run of one body")
-        return
     text = await work(
         "comparing edges with outlines", lambda: look_for_disagreement(folder, frame, shown, session.pictures)
     )
@@ -91,21 +103,21 @@ async def _blame(session: Session, shown: ShownTrial, folder: Path, frame: int, 
 
 
 async def _show_run(
-    session: Session, shown: ShownTrial, folder: Path, beside: str, frame: int
-) -> tuple[CameraViews, Correction | None]:
-    """Lay a run out, at a frame; return its pictures, and what corrects it."""
+    session: Session, shown: ShownTrial, files: RunWatch, beside: str, frame: int
+) -> tuple[CameraViews, Correction | PlayersMasks]:
+    """Lay a run out, at a frame, and let what shows it be shown anew when its files change.
+
+    Return its pictures, and what corrects it.
+    """
+    folder = files.folder
     bodies: list[Callable[[int], Any]] = []
-    correction = None if holds_players(folder) else Correction(session, shown, folder)
-    with errors_shown():
-        summary = await in_thread(read_summary, folder, says="reading the run") if (folder / SUMMARY).is_file() else {}
-        for finding in summary.get("self_check") or []:
-            if finding["is_alarm"]:
-                ui.label(finding["sentence"]).classes("bad small")
+    correction = PlayersMasks(session, shown) if holds_players(folder) else Correction(session, shown, files)
+    alarms = ui.refreshable(_show_alarms)
+    await alarms(folder)
     address = f"/curves/{quote(folder.name)}?beside={quote(beside)}&of="
     with ui.element("div").classes("row-line"):
-        if correction is not None:
-            correction.build()
-            bodies.append(correction.turn_to)
+        correction.build()
+        bodies.append(correction.turn_to)
         kinds = await in_thread(curve_kinds, folder, says="reading the run")
         kind = ui.select(kinds, label="curves", value="", on_change=lambda: curves.show(address + quote(kind.value)))
         kind.props("outlined dense options-dense").style("min-width: 180px")
@@ -133,24 +145,39 @@ async def _show_run(
                 frame=frame,
                 overlay=f"/overlay/{quote(folder.name)}/{{frame}}{query}",
                 on_frame=turn_to,
-                on_move=None if correction is None else correction.move,
-                on_drag=None if correction is None else correction.drag,
+                on_move=correction.move if isinstance(correction, Correction) else None,
+                on_drag=correction.drag if isinstance(correction, Correction) else None,
             )
+            correction.view = view
         with ui.element("div").classes("side"):
-            if correction is None:
+            correction.build_watch()
+            if isinstance(correction, PlayersMasks):
                 bodies.append(await _players_stage(folder, view.frame))
             else:
-                correction.view = view
-                correction.build_watch()
-                bodies += await _stage(folder, view)
+                bodies += await _stage(files, view)
     curves = Curves(address, frame=frame)
-    if correction is not None:
-        correction.curves = curves
+
+    def draw_anew() -> None:
+        view.run_method("refresh")
+        curves.run_method("load")
+        alarms.refresh()
+
+    files.changed += [draw_anew, lambda: turn_to(view.frame)]
     return view, correction
 
 
-async def _stage(folder: Path, view: CameraViews) -> list[Callable[[int], None]]:
+async def _show_alarms(folder: Path) -> None:
+    """Show what the self-check of a finished run found wrong."""
+    with errors_shown():
+        summary = await in_thread(read_summary, folder, says="reading the run") if (folder / SUMMARY).is_file() else {}
+        for finding in summary.get("self_check") or []:
+            if finding["is_alarm"]:
+                ui.label(finding["sentence"]).classes("bad small")
+
+
+async def _stage(files: RunWatch, view: CameraViews) -> list[Callable[[int], None]]:
     """Build the scene of a run of one body; return what shows a frame in it."""
+    folder = files.folder
     rows = await in_thread(run_rows, folder, says="reading the run")
     model = await in_thread(run_body, folder, says="reading the run")
     path, reach_m = rows.position[np.isfinite(rows.position).all(axis=1)], reach_of(model)
@@ -161,7 +188,9 @@ async def _stage(folder: Path, view: CameraViews) -> list[Callable[[int], None]]
     def show(frame: int) -> None:
         body.show(run_rows(folder).pose(frame))
 
-    return [show, MomentumArrow(folder, view, scene).show]
+    arrow = MomentumArrow(folder, view, scene)
+    files.changed.append(arrow.read)
+    return [show, arrow.show]
 
 
 async def _players_stage(folder: Path, frame: int) -> Callable[[int], None]:
@@ -193,9 +222,10 @@ class MomentumArrow:
         self._folder, self._view = folder, view
         self._momenta: Momenta | None = None
         self._arrow, self._says = Arrow(scene, _MOMENTUM_COLOUR), ui.label().classes("small soft")
-        ui.timer(0, self._read, once=True)
+        ui.timer(0, self.read, once=True)
 
-    async def _read(self) -> None:
+    async def read(self) -> None:
+        """Read the run's table, and show what it says of the frame in view."""
         with errors_shown():
             self._momenta = await in_thread(run_momenta, self._folder, says="reading the run")
             self.show(self._view.frame)

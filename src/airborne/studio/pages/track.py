@@ -9,15 +9,14 @@ from urllib.parse import quote
 from nicegui import ui
 
 from airborne.errors import STOPPED, AirborneError, TrialError, count
-from airborne.io.names import check_name
-from airborne.motion.run_folder import MOTION, SUMMARY
+from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY
 from airborne.studio.commands import Command
-from airborne.studio.folder import is_inside, outer_links
-from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
+from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pages.track_settings import TrackSettingsBar
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import find_run, list_runs
-from airborne.studio.runs import count_rows
+from airborne.studio.run_names import check_run_name, next_run_name
+from airborne.studio.runs import count_rows, describe_progress
 from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Curves
 
@@ -60,6 +59,8 @@ class _Panel:
     n_before: int = 0  # of them, when it was resumed
     ended: Command | None = None  # the run whose end was told
     curves: Curves | None = None  # once there are frames
+    _was_running: bool = False
+    _problem: str = ""  # of the folder's name
 
     def build(self) -> None:
         """Lay out the bar, the pictures, and a look at the run every second."""
@@ -68,20 +69,20 @@ class _Panel:
         self.ended = None if self._is_running else command
         name = command.words[3] if command is not None else runs[0].name if runs else "results"
         with ui.element("div").classes("row-line"):
-            self.name = ui.input("folder of the run", value=name, on_change=lambda: self.look(anew=True))
+            self.name = ui.input("folder of the run", value=name, on_change=self.rename)
             self.name.props("outlined dense").style("width: 200px")
             self.settings.build()
             self.begin = ui.button("Track", on_click=lambda: self.start()).props("unelevated")
             self.resume = ui.button("Go on", on_click=lambda: self.start("--resume")).props("unelevated")
-            self.again = ui.button("Track again", on_click=lambda: self.start("--overwrite")).props("outline")
+            self.again = ui.button("Track again", on_click=self.ask).props("outline")
             self.halt = ui.button("Stop", on_click=self.stop).props("unelevated color=grey-8")
-            self._show_buttons()
             self.bar = (
                 ui.linear_progress(0, show_value=False, size="10px")
                 .props("rounded aria-label=progress")
                 .style("width: 220px")
             )
             self.says = ui.label().classes("small soft")
+            self._show_buttons()
         self.view = CameraViews(
             self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.session.turn_to
         )
@@ -90,16 +91,20 @@ class _Panel:
 
     @property
     def folder(self) -> Path:
-        """The run's folder."""
-        return self.session.folder / ((self.name.value or "").replace("/", "_").lstrip(".") or "results")
+        """The run's folder. Raises TrialError where what is given cannot be one."""
+        return check_run_name(self.session.folder, self._name)
+
+    @property
+    def _name(self) -> str:
+        return self.name.value or ""
 
     @property
     def _overlay(self) -> str:
-        return f"/overlay/{quote(self.folder.name)}/{{frame}}"
+        return "" if self._problem else f"/overlay/{quote(self._name)}/{{frame}}"
 
     @property
     def _curves(self) -> str:
-        return f"/curves/{quote(self.folder.name)}?frames={self.n_done}"  # another address for each state of a run
+        return f"/curves/{quote(self._name)}?frames={self.n_done}"  # another address for each state of a run
 
     @property
     def _command(self) -> Command | None:
@@ -111,28 +116,53 @@ class _Panel:
 
     def _count(self) -> tuple[int, int | None]:
         """Return how many frames the run holds so far, and which is the newest."""
-        run = find_run(self.session.folder, self.folder.name)
-        return (0, None) if run is None else count_rows(run)
+        run, command = find_run(self.session.folder, self._name), self._command
+        if run is None or (
+            command is not None
+            and command.is_running
+            and "--overwrite" in command.words
+            and not command.has_written(run / MOTION)
+        ):
+            return 0, None  # what is there is the run before
+        return count_rows(run)
 
     def start(self, *options: str) -> None:
         """Start `airborne track`."""
         if self._is_running:
             return
-        try:
-            check_name(self.folder.name)
-            if not is_inside(self.session.folder, self.folder):
-                raise TrialError(f"{self.folder.name} is a link that leads out of the folder; give another name")
-            if links := outer_links(self.session.folder, self.folder):
-                raise TrialError(f"{', '.join(links)} leads out of the folder; remove the link, or give another name")
+        with errors_shown():
             self.session.project().trial()
-        except (ValueError, TrialError) as error:
-            complain(str(error))
-            return
-        words = ["track", self.session.path.name, "-o", self.folder.name, *options]
-        self.n_before = self._count()[0] if "--resume" in options else 0
-        self.session.commands["track"] = Command(words, self.session.folder)
-        self.n_done = -1
+            words = ["track", self.session.path.name, "-o", self.folder.name, *options]
+            self.n_before = self._count()[0] if "--resume" in options else 0
+            self.session.commands["track"] = Command(words, self.session.folder)
+            self.n_done = -1
+            self._show_buttons()
+
+    async def ask(self) -> None:
+        """Track again once it is clear what becomes of the run that is there."""
+        old, n_done = self._name, (await in_thread(self._count, says=""))[0]
+        new = next_run_name(self.session.folder, old)
+        with ui.dialog().props('aria-label="track again"') as dialog, ui.card():
+            held = f"{old} holds a run of {count(n_done, 'frame')}." if n_done else f"{old} holds a run."
+            ui.label(f"{held} Track into {new} and keep it, or replace it?")
+            with ui.element("div").classes("row-line"):
+                ui.button(f"Keep it, track into {new}", on_click=lambda: dialog.submit("keep")).props("unelevated")
+                ui.button("Replace it", on_click=lambda: dialog.submit("replace")).props("outline")
+                ui.button("Cancel", on_click=lambda: dialog.submit(None)).props("flat")
+        answer = await dialog
+        dialog.delete()
+        if answer == "keep":
+            self.name.value = new
+            self.start()
+        elif answer == "replace":
+            self.start("--overwrite")
+
+    async def rename(self) -> None:
+        """Show the run of another name."""
+        self.n_done, self.says.text = -1, ""
         self._show_buttons()
+        self.view.set_overlay(self._overlay)
+        await self.look()
 
     async def stop(self) -> None:
         """Stop the run; its frames stay."""
@@ -140,13 +170,12 @@ class _Panel:
             await in_thread(self._command.stop, says="stopping")
         self._show_buttons()
 
-    async def look(self, *, anew: bool = False) -> None:
+    async def look(self) -> None:
         """Show how far the run is, and its newest frame unless the user looks at another."""
-        if anew:
-            self.view.set_overlay(self._overlay)
-            self._show_buttons()
         n_done, newest = await in_thread(self._count, says="")
         command = self._command
+        if self._is_running != self._was_running:  # another window has started it, or it has ended
+            self._show_buttons()
         if command is not None and command.is_running:
             self._say_progress(command, n_done)
         elif command is not None and command is not self.ended:
@@ -154,7 +183,6 @@ class _Panel:
             self._say_end(command)
         if n_done != self.n_done:
             is_first, self.n_done = self.n_done < 0, n_done
-            self.bar.value = n_done / max(self.settings.n_frames, 1)
             self.view.run_method("refresh")
             self._show_curves()
             if newest is not None and self._is_running:
@@ -170,15 +198,12 @@ class _Panel:
             with self.area:
                 self.curves = Curves(self._curves, frame=self.view.frame).style("height: 220px")
 
-    def _say_progress(self, command: Command, n_done: int) -> None:
-        left, n_frames = "", self.settings.n_frames
-        if (n_own := n_done - self.n_before) > 2:
+    def _say_progress(self, command: Command, n_rows: int) -> None:
+        n_frames, n_done, left = self.settings.n_frames, max(n_rows, command.counted()), ""
+        if (n_own := n_done - self.n_before) > 2 and n_done < n_frames:
             left = f", about {command.seconds / n_own * (n_frames - n_done):.0f} s left"
-        self.says.text = (
-            f"{n_done} of {count(n_frames, 'frame')}, {command.seconds:.0f} s{left}"
-            if n_done
-            else (f"opening videos, {command.seconds:.0f} s")
-        )
+        self.bar.value = n_done / max(n_frames, 1)
+        self.says.text = f"{describe_progress(n_done, n_frames)}, {command.seconds:.0f} s{left}"
 
     def _say_end(self, command: Command) -> None:
         if command.code == 0:
@@ -192,10 +217,27 @@ class _Panel:
         self._show_buttons()
 
     def _show_buttons(self) -> None:
-        """Show the buttons that the run has now."""
-        folder, is_running = self.folder, self._is_running
-        is_begun, is_finished = (folder / MOTION).is_file(), (folder / SUMMARY).is_file()
+        """Show what can be done about the run now."""
+        self._was_running = is_running = self._is_running
+        problem = ""
+        is_begun = is_finished = False
+        if is_running and self._command is not None:
+            self.name.value = self._command.words[3]
+        else:
+            try:
+                folder = self.folder
+                is_begun, is_finished = (
+                    any((folder / name).is_file() for name in (MOTION, JOINTS)),
+                    (folder / SUMMARY).is_file(),
+                )
+            except TrialError as error:
+                problem = str(error)
+        self.name.set_enabled(not is_running)
+        self.bar.set_visibility(is_running)
         self.halt.set_visibility(is_running)
-        self.begin.set_visibility(not is_running and not is_begun)
+        self.begin.set_visibility(not is_running and not is_begun and not problem)
         self.resume.set_visibility(not is_running and is_begun and not is_finished)
         self.again.set_visibility(not is_running and is_begun)
+        if problem or self._problem:
+            self.says.text = problem
+        self._problem = problem

@@ -6,6 +6,7 @@ from nicegui import ui
 
 from airborne.errors import TrialError
 from airborne.studio.pages.layout import errors_shown
+from airborne.studio.runs import count_frames
 from airborne.studio.session import Session
 from airborne.trial.settings import BODY_METHODS, PLAYERS_METHODS
 
@@ -21,9 +22,7 @@ class TrackSettingsBar:
     @property
     def n_frames(self) -> int:
         """How many frames are tracked."""
-        track = self._trial.track
-        stop = self._n_images if track.stop is None else min(self._n_images, track.stop)
-        return len(range(self._trial.start.frame, stop, track.every))
+        return count_frames(self._trial, self._n_images)
 
     def build(self) -> None:
         """Lay out the choices."""

@@ -1,0 +1,137 @@
+"""What became of corrections: the frames of a run that were tracked again, and how near the body came to each key."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import Pose
+from airborne.body.chain import delta_between
+from airborne.cameras import Rig
+from airborne.errors import count
+from airborne.motion.run_folder import MOTION, RUN_RECORD, read_record
+from airborne.run.folder import stretches_between
+from airborne.run.keys import read_key
+from airborne.studio.folder import file_stamp
+from airborne.studio.runs import run_body, run_rig, run_rows
+from airborne.tracking import Status
+from airborne.tracking.evidence import PoseEvidence
+from airborne.trial.file import Trial
+from airborne.trial.keys import KeyTable
+from airborne.trial.pose_forms import BY_HAND
+
+_MOST_KEYS = 2  # that are told, the worst first
+_LOST = "the pictures show no body near its key; undo it, or drag the body onto what they show, and track again"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunBefore:
+    """A run of one body before it is tracked again."""
+
+    record: dict[str, Any]
+    index: NDArray[np.int64]  # (n,) its frames
+    stamp: Any  # of its file
+
+    @classmethod
+    def of(cls, run: Path) -> RunBefore:
+        """Take a run as it is now. Raises ResultError."""
+        return cls(read_record(run / RUN_RECORD), run_rows(run).index, file_stamp(run / MOTION))
+
+    def is_changed(self, run: Path) -> bool:
+        """Say whether the run is another since."""
+        return file_stamp(run / MOTION) != self.stamp
+
+
+def describe_tracked_again(before: RunBefore, run: Path, trial: Trial) -> str:
+    """Say which frames were tracked again, which of them are lost, and how near the body is to the keys that changed.
+
+    Raises AirborneError.
+    """
+    record, rows, step = read_record(run / RUN_RECORD), run_rows(run), trial.track.every
+    is_new = ~np.isin(rows.index, before.index)
+    for first, last in stretches_between(before.record, record):
+        is_new |= (first < rows.index) & (rows.index < last)
+    if not is_new.any():
+        return f"no frame was tracked again: the corrections touch none of {name_frames(rows.index, step)}"
+    old, new = before.record.get("keys", {}), record["keys"]
+    changed = [key for key in trial.key if old.get(str(key.frame)) != new.get(str(key.frame))]
+    told = _describe_keys(run, trial, [key for key in changed if rows.row(key.frame) is not None])
+    at_keys = [key.frame for key in changed]
+    lost = rows.index[is_new & (rows.status == Status.LOST.value) & ~np.isin(rows.index, at_keys)]
+    if len(lost):
+        told.append(f"{name_frames(lost, step)} {'is' if len(lost) == 1 else 'are'} lost")
+    return "; ".join([f"{name_frames(rows.index[is_new], step)} tracked again", *told])
+
+
+def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[str]:
+    """Say of each key how near the body is to it: the worst first, and how many more there are."""
+    rows, model, rig, told = run_rows(run), run_body(run), run_rig(run), []
+    for key in keys:
+        pose, status = rows.pose(key.frame), rows.status[rows.row(key.frame)]
+        if pose is None:
+            told.append((np.inf, f"frame {key.frame} is now lost: {_LOST}"))
+            continue
+        doubt = "" if status == Status.TRACKED.value else f", {status}"
+        own = key.model_copy(update={"detections": None})  # what was set by hand
+        is_by_hand = key.model_fields_set & (BY_HAND | {"joints_m", "points_px"})
+        far = _farthest(read_key(trial, own, model, rig=rig, facts=()), pose, rig) if is_by_hand else None
+        words = f"at frame {key.frame}{doubt}" + ("" if far is None else f" {far.words}")
+        told.append((0.0 if far is None else far.sds, words))
+    told = [words for _, words in sorted(told, key=lambda each: -each[0])]
+    more = len(told) - _MOST_KEYS
+    return told if more <= 0 else [*told[:_MOST_KEYS], f"nearer at {count(more, 'more key')}"]
+
+
+class _Miss(NamedTuple):
+    """How far a pose is from a part of a key."""
+
+    sds: float
+    words: str
+
+
+def _farthest(key: PoseEvidence, pose: Pose, rig: Rig) -> _Miss:
+    """Return the part of a key from which a pose is farthest, in deviations."""
+    points, found = key.model.with_pose(pose).landmarks, list[_Miss]()
+    names = [_plain(landmark.name) for landmark in key.model.landmarks]
+    for mark, P, px, sd_px in zip(key.clicked, key.P, key.px, key.px_sds, strict=True):
+        camera = rig.cameras[int(np.flatnonzero((rig.P == P).all(axis=(1, 2)))[0])]
+        off_px = float(np.linalg.norm(camera.undistort_px(camera.px_from_world(points[mark])) - px))
+        found.append(_miss(f"the {names[mark]} is", off_px, "px", sd_px, f"from its click in {camera.name}"))
+    for mark, position, sd_m in zip(key.landmarks, key.positions, key.position_sds, strict=True):
+        off_m = float(np.linalg.norm(points[mark] - position))
+        found.append(_miss(f"the {names[mark]} is", 1e3 * off_m, "mm", 1e3 * sd_m, "from its place in the key"))
+    if key.pose is not None:
+        delta = delta_between(key.pose, pose)
+        if np.isfinite(key.pose_sds[0]):
+            off_m, sd_m = float(np.linalg.norm(delta[:3])), key.pose_sds[0]
+            found.append(_miss("the body is", 1e3 * off_m, "mm", 1e3 * sd_m, "from its place in the key"))
+        turns = np.degrees(np.linalg.norm(delta[3:].reshape(-1, 3), axis=1))
+        for part, (turn, sd) in enumerate(zip(turns, np.degrees(key.pose_sds[3::3]), strict=True)):
+            if np.isfinite(sd):
+                what = "body" if part == 0 else _plain(key.model.segments[part].name)
+                found.append(_miss(f"the {what} is turned", float(turn), "°", sd, "from its key"))
+    return max(found, key=lambda each: each.sds)
+
+
+def _miss(what: str, off: float, unit: str, sd: float, than: str) -> _Miss:
+    space = "" if unit == "°" else " "
+    return _Miss(off / sd, f"{what} {off:.1f}{space}{unit} {than} ({off / sd:.1f} sd)")
+
+
+def _plain(name: str) -> str:
+    """Return a part's name in words: left knee."""
+    words = name.split("_")
+    return " ".join([words[-1], *words[:-1]] if words[-1] in ("left", "right") else words)
+
+
+def name_frames(frames: NDArray[np.int64], step: int = 1) -> str:
+    """Name frames (n,), ascending, by the stretches in which they lie, as frames 3 and 5 to 7; `step` joins them."""
+    rows = np.split(frames, np.flatnonzero(np.diff(frames) > step) + 1)
+    names = [f"{row[0]}" if len(row) == 1 else f"{row[0]} to {row[-1]}" for row in rows]
+    text = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return f"{'frame' if len(frames) == 1 else 'frames'} {text}"
