@@ -1,6 +1,20 @@
-"""Commands that the studio starts, each a process of its own."""
+"""Commands that the studio starts, each a process of its own, and runs that were started elsewhere."""
 
+import subprocess
+import sys
+
+from airborne.io.folder_lock import LOCK
+from airborne.motion.run_folder import SUMMARY
 from airborne.studio.commands import Command
+from airborne.studio.session import Session
+
+_WRITES = """
+import pathlib, sys, time
+from airborne.io.folder_lock import sole_writer
+with sole_writer(pathlib.Path(sys.argv[1])):
+    print("writes", flush=True)
+    time.sleep(600)
+"""
 
 
 def test_two_commands_of_one_kind_say_each_its_own(tmp_path):
@@ -10,3 +24,22 @@ def test_two_commands_of_one_kind_say_each_its_own(tmp_path):
         command._process.wait()
     assert ["no_run" in each.complaint() for each in commands] == [True, False]
     assert "no_other" in commands[1].complaint()
+
+
+def test_a_run_that_a_killed_studio_left_is_found_again_and_can_be_stopped(tmp_path):
+    assert Session(tmp_path, tmp_path / "trial.toml").commands == {}
+    run = tmp_path / "results"
+    with subprocess.Popen([sys.executable, "-c", _WRITES, str(run)], stdout=subprocess.PIPE, text=True) as process:
+        process.stdout.readline()
+        command = Session(tmp_path, tmp_path / "trial.toml").commands["track"]
+        assert command.is_running and not command.is_own
+        assert command.line == "airborne track trial.toml -o results"
+        assert 0 <= command.seconds < 600
+        command.stop()
+        assert process.wait() != 0
+    assert (command.is_running, command.code) == (False, 1)
+    assert command.complaint() == "it ended early; go on"
+    (run / SUMMARY).touch()
+    assert (command.code, command.output()) == (0, "ended\n")
+    (run / LOCK).write_text("process 999999999 on another since 2026-01-01 00:00:00")
+    assert Session(tmp_path, tmp_path / "trial.toml").commands == {}

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
 from airborne.run.opening import calibrated_cameras
-from airborne.studio.commands import Command
+from airborne.studio.commands import Command, find_tracking
 from airborne.studio.drafts import DRAFTS, drafts_text, read_draft
 from airborne.studio.folder import file_stamp, path_inside
 from airborne.studio.pictures import Pictures, ShownTrial
@@ -35,6 +35,8 @@ class Session:
         self.pictures, self.editor = Pictures(folder / FOLDER), Editor(folder)
         self.place = read_place(folder)
         self.commands: dict[str, Command] = {}  # that were started here, by what they do
+        if (tracking := find_tracking(folder, path)) is not None:
+            self.commands["track"] = tracking
         self._known: dict[str, tuple[Hashable, Any]] = {}
         self._lock = Lock()
 
