@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from itertools import starmap
 from pathlib import Path
 
 from airborne.studio.project import StudioStep, steps
@@ -14,7 +15,7 @@ _OWN = "* { box-sizing: border-box; } body { margin: 0; } .body { height: calc(1
 
 def not_found_html(session: Session, address: str) -> str:
     """Return the whole page."""
-    rail = "".join(map(_link, steps(session.project())))
+    rail = "".join(starmap(_link, enumerate(steps(session.project()), start=1)))
     where = escape(f"{session.folder.name}/{session.path.name}")
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Airborne: no such page</title>
@@ -27,8 +28,8 @@ def not_found_html(session: Session, address: str) -> str:
 """
 
 
-def _link(step: StudioStep) -> str:
+def _link(number: int, step: StudioStep) -> str:
     spans = f'<span class="title">{escape(step.name)}</span><span class="says">{escape(step.says)}</span>'
-    mark = "✓" if step.state == "ready" else ""
+    mark = "✓" if step.state == "ready" else number
     state = step.state.partition(" ")[0]
     return f'<a href="{step.address}" class="{state}"><span class="number">{mark}</span>{spans}</a>'

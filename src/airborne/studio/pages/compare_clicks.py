@@ -31,9 +31,9 @@ class ClickComparison:
         if not runs:
             ui.label("Once there is a run, the clicks can be compared with it here.").classes("soft small")
             return
-        with ui.element("div").classes("row-line"):
+        with ui.element("div").classes("row-line tight"):
             choice = ui.select([run.name for run in runs], label="run", value=runs[0].name)
-            choice.props("outlined dense options-dense").style("width: 110px")
+            choice.props("outlined dense options-dense").style("width: 106px")
             ui.button("Compare", on_click=lambda: self.compare(session.folder / choice.value)).props("flat dense")
             agree = ui.button("Agreement", on_click=lambda: self.agree(session.folder / choice.value))
             whom = "these clicks" if self.is_person else "everyone who digitised"

@@ -41,7 +41,7 @@ _HELP = (
 )
 _EMPTY = "There are no points to click yet. Name one below, such as one end of the body, and press Add."
 _DRAFT = "points"  # their name among the drafts
-_AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing"}
+_AFTER = {"point": "next point", "frame": "next frame", "stay": "nothing"}
 
 
 async def digitise_page(session: Session) -> None:
@@ -115,14 +115,15 @@ class DigitisePanel(PointsPanel):
             change = ui.button("Change", on_click=lambda: self.change_who(operator.value or "", number.value))
             change.props("flat dense")
         self.note = ui.label().classes("small")
-        with ui.element("div").classes("row-line"):
+        with ui.element("div").classes("row-line tight"):
             then = ui.select(_AFTER, label="after a click").bind_value(self, "then")
-            then.props("outlined dense options-dense").style("width: 180px")
-            ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
+            then.props("outlined dense options-dense").style("width: 138px")
+            help_on = ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
+            help_on.props("dense")
 
     def _build_points(self) -> None:
-        with ui.element("div").classes("row-line"):
-            name = ui.input("another point").props("dense outlined").style("width: 130px")
+        with ui.element("div").classes("row-line tight"):
+            name = ui.input("another point").props("dense outlined").style("width: 114px")
             ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
             ui.button("Drop", on_click=self.drop).props("flat dense").tooltip("the chosen point, one of your own")
             ui.button("Remove", on_click=self.remove).props("flat dense").tooltip("the chosen click")
