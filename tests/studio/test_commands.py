@@ -2,11 +2,14 @@
 
 import subprocess
 import sys
+from fractions import Fraction
 
+from airborne.cameras import Rig, camera_looking_at
 from airborne.io.folder_lock import LOCK
 from airborne.motion.run_folder import SUMMARY
 from airborne.studio.commands import Command
 from airborne.studio.session import Session
+from tests.support.person_run import write_person_run
 
 _WRITES = """
 import pathlib, sys, time
@@ -24,6 +27,19 @@ def test_two_commands_of_one_kind_say_each_its_own(tmp_path):
         command._process.wait()
     assert ["no_run" in each.complaint() for each in commands] == [True, False]
     assert "no_other" in commands[1].complaint()
+
+
+def test_a_command_says_from_the_first_moment_what_it_does_and_how_far_it_is(tmp_path):
+    write_person_run(
+        tmp_path / "results",
+        Rig((camera_looking_at("a", [3, -4, 1], [0, 0, 1], focal_px=300, size=(320, 240)),)),
+        12,
+        Fraction(50),
+    )
+    command = Command(["export", "results", "--trc"], tmp_path)
+    assert "results.trc" in command.output()
+    command._process.wait()
+    assert (command.code, command.progress()) == (0, "writing trc: 0 of 1")
 
 
 def test_a_run_that_a_killed_studio_left_is_found_again_and_can_be_stopped(tmp_path):

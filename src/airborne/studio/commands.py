@@ -15,12 +15,14 @@ from itertools import count
 from pathlib import Path
 
 from airborne.io.folder_lock import LOCK, find_writer
+from airborne.io.terminal import WATCHED
 from airborne.motion.run_folder import SUMMARY
 from airborne.studio.writing import FOLDER
 
 _RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 _numbers = count(1)  # of the commands: two exports may run at once
 _PATIENCE_S = 10.0  # for a process that was told to stop
+_LONGEST_LINE = 4096  # bytes: of a run of hours there are many lines
 _SOON_S = 0.05  # between looks whether it has
 
 
@@ -43,6 +45,7 @@ class Command:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=log,
+                env=os.environ | {WATCHED: "yes"},
             )
 
     @property
@@ -78,7 +81,9 @@ class Command:
 
     def progress(self) -> str:
         """Return the last line of what it says beside its output."""
-        return self._log.read_text(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
+        with self._log.open("rb") as log:
+            log.seek(max(0, self._log.stat().st_size - _LONGEST_LINE))
+            return log.read().decode(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
 
     def stop(self) -> None:
         """Stop it as Ctrl-C does, and wait for its end."""
