@@ -51,7 +51,7 @@ def test_the_cross_digitised_by_one_person(tmp_path):
 def try_points(page):
     """Add a point, once more, and drop it; one of the body with clicks is not dropped."""
     own, add = page.locator(".point", has_text="hand"), page.get_by_role("button", name="Add", exact=True)
-    page.get_by_label("another point").fill("hand")
+    page.get_by_label("new point").fill("hand")
     add.click()
     own.wait_for()
     page.mouse.click(*at_pixel(page, 0, 300, 200))

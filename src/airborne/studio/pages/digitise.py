@@ -123,7 +123,7 @@ class DigitisePanel(PointsPanel):
 
     def _build_points(self) -> None:
         with ui.element("div").classes("row-line tight"):
-            name = ui.input("another point").props("dense outlined").style("width: 114px")
+            name = ui.input("new point").props("dense outlined").style("width: 114px")
             ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
             ui.button("Drop", on_click=self.drop).props("flat dense").tooltip("the chosen point, one of your own")
             ui.button("Remove", on_click=self.remove).props("flat dense").tooltip("the chosen click")
