@@ -65,6 +65,20 @@ def test_exact_clicks_give_the_true_poses(rig, truth):
     assert poses.residual.max() < ROUNDTRIP
 
 
+def test_points_that_the_body_does_not_have_are_left_out_and_named(rig, truth):
+    own = clicks(truth, rig)
+    px = np.concatenate([own.px, own.px[:, :2] + 40], axis=1)
+    px[:, -1] = np.nan  # named, but never clicked
+    more = replace(own, points=(*ENDS, "hand", "foot"), px=px)
+    poses = fit_digitised_poses(more, rig, cross())
+    np.testing.assert_array_equal(poses.position, fit_digitised_poses(own, rig, cross()).position)
+    result = compare_digitised(motion_of(truth), poses, IDENTITY)
+    assert "not compared, as the body has no such points: hand" in result.describe().splitlines()
+    assert result.to_dict()["points_left_out"] == ["hand"]
+    with pytest.raises(ResultError, match="point 'hand' is the end of no single box"):
+        fit_digitised_poses(replace(more, points=("hand", "foot"), px=px[:, -2:]), rig, cross())
+
+
 def test_exact_clicks_through_bent_lenses_give_the_true_poses(rig, truth):
     bent = replace(rig, cameras=tuple(replace(c, distortion=np.array([-0.1, 0.02, 1e-3, 1e-3, 0])) for c in rig))
     poses = fit_digitised_poses(clicks(truth, bent), bent, cross())

@@ -1,6 +1,6 @@
 """The paragraph for a methods section says what the summary holds, and nothing that it does not hold."""
 
-from airborne.export.methods_text import describe_methods
+from airborne.export.methods_text import describe_corrections, describe_methods
 
 BODY = {
     "n_frames": 34, "n_tracked": 30, "n_uncertain": 3, "n_lost": 1, "rate_hz": 50.0, "median_position_sd_mm": 0.71,
@@ -37,3 +37,17 @@ def test_players_and_what_is_missing():
     assert "34 mm for a player's joints" in text
     assert "None" not in text
     assert "residuals" not in text
+
+
+def test_corrections_are_said_with_their_frames_and_deviations():
+    clicks = {"gives": ["clicks by hand"], "sd_px": 5.0}
+    turn = {"gives": ["orientation by hand"], "sd_deg": 10.0}
+    keys = [{"frame": 12, **clicks}, {"frame": 30, **turn}, {"frame": 44, **clicks}]
+    masks = [("left", 3, 5), ("right", 7, 7), ("left", 9, 9)]
+    summary = {"keys": keys, "masks": [dict(zip(("camera", "first", "last"), mask, strict=True)) for mask in masks]}
+    assert describe_corrections(summary) == [
+        "The pose was corrected in 3 frames: 12 and 44 (clicks by hand, ± 5 px), 30 (orientation by hand, ± 10 °).",
+        "Cameras were left out of some frames: left of 3 to 5 and 9; right of 7.",
+    ]
+    assert " ".join(describe_corrections(summary)) in describe_methods({**BODY, **summary})
+    assert describe_corrections(BODY) == []

@@ -53,6 +53,12 @@ def test_headline_numbers_stand_on_the_page(tmp_path):
         assert words in html
 
 
+def test_corrections_stand_on_the_page_where_there_are_some(tmp_path):
+    assert "Corrections" not in html_of(tmp_path, run())
+    html = html_of(tmp_path, run(), keys=[{"frame": 7, "gives": ["clicks by hand"], "sd_px": 5.0}])
+    assert "The pose was corrected in 1 frame: 7 (clicks by hand, ± 5 px)." in html
+
+
 def test_the_unobservable_is_named_and_has_no_number(tmp_path):
     html = html_of(tmp_path, run(unseen=range(20)))
     assert "<b>cannot be seen</b>" in html

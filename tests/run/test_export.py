@@ -140,8 +140,8 @@ def test_where_nothing_was_found_there_is_nothing_to_export(tmp_path):
 
 def test_progress_grows_to_its_end(person_run, tmp_path):
     calls = []
-    export_run(person_run, tmp_path, progress=lambda done, total: calls.append((done, total)))
-    assert calls == [(5, 10), (10, 10)]
+    export_run(person_run, tmp_path, ["csv", "trc"], lambda *said: calls.append(said))
+    assert calls == [("measuring", 5, 10), ("measuring", 10, 10), ("writing trc", 0, 2), ("writing csv", 1, 2)]
 
 
 def run_command(monkeypatch, *arguments):

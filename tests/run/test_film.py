@@ -47,14 +47,20 @@ def test_a_stretch_shows_its_frames_and_a_cursor_over_the_curves(run, tmp_path):
 
 
 def test_a_gif_leaves_pictures_out_that_browsers_would_slow_down(run, tmp_path):
-    write_film(run, tmp_path / "film.gif")
+    calls = []
+    write_film(run, tmp_path / "film.gif", progress=lambda *said: calls.append(said))
+    assert calls == [(k, N) for k in range(1, N + 1)]
     with GifPicture.open(tmp_path / "film.gif") as film:
         assert (film.n_frames, film.info["duration"]) == (N // 2, 40)
 
 
 @pytest.mark.parametrize(
     ("name", "frames", "said"),
-    [("film.avi", {}, "films are .mp4 or .gif"), ("film.mp4", {"first": 40}, "has frames 0 to 11, and 40 is after 11")],
+    [
+        ("film.avi", {}, "films are .mp4 or .gif"),
+        ("film.mp4", {"first": 40}, "has frames 0 to 11, and 40 is after 11"),
+        ("film.mp4", {"first": 20, "last": 5}, "frames 20 to 5: the first frame must come before the last"),
+    ],
 )
 def test_what_cannot_be_filmed_is_one_line(run, tmp_path, name, frames, said):
     with pytest.raises(ResultError, match=said):

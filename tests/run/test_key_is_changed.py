@@ -77,6 +77,10 @@ def test_frames_between_the_neighbours_of_a_changed_key_are_tracked_again(
     assert all(after[frame] == before[frame] for frame in (0, *range(8, LAST)))
     assert after[4] != before[4]
     assert summary["n_lost"] == 0
+    assert [(each["frame"], each["gives"], each["sd_m"]) for each in summary["keys"]] == [
+        (4, ["position by hand"], 0.002),
+        (8, ["position by hand"], 0.03),
+    ]
     found.clear()
     track_trial(changed, run, resume=True, pictures=False)
     assert found == set()
@@ -98,6 +102,7 @@ def test_a_camera_is_left_out_of_the_frames_of_a_mask_which_are_tracked_again(cr
     masked = cross(*keys).model_copy(update={"mask": [MaskTable(camera="cam2", first=5, last=6)]})
     summary = track_trial(masked, run, resume=True, pictures=False).summary
     assert found == {5, 6, 7}
+    assert summary["masks"] == [{"camera": "cam2", "first": 5, "last": 6}]
     assert views == {5: [True, False, True], 6: [True, False, True], 7: [True, True, True]}
     assert "cam2: no image at 2 of 13 frames: frames 5 to 6" in summary["events"]
     assert all(poses(run)[frame] == before[frame] for frame in (*range(5), *range(8, LAST)))
@@ -108,7 +113,8 @@ def test_a_camera_is_left_out_of_the_frames_of_a_mask_which_are_tracked_again(cr
 
 def test_a_record_without_keys_is_that_of_a_run_without_keys(cross, tmp_path, monkeypatch):
     trial = cross().model_copy(update={"track": cross().track.model_copy(update={"stop": 2})})
-    track_trial(trial, tmp_path / "run", pictures=False)
+    summary = track_trial(trial, tmp_path / "run", pictures=False).summary
+    assert not {"keys", "masks"} & set(summary)
     record = tmp_path / "run" / "run.json"
     written = json.loads(record.read_text())
     assert written.pop("keys") == {"0": "start"}

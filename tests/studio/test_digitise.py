@@ -9,7 +9,7 @@ import pytest
 from airborne.evaluation import read_digitised
 from tests.support.digitised_cross import MOST_DEG, MOST_MM, POINTS, compare, digitise, prepare_cross
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import fork_studio, open_page, wait_for_frame
+from tests.support.studio import at_pixel, fork_studio, open_page, wait_for_frame
 
 FRAMES = range(0, 16, 4)
 GREY = "#c8cdd3"  # of marks where a point is expected
@@ -33,6 +33,7 @@ def test_the_cross_digitised_by_one_person(tmp_path):
         page.locator(".point .n", has_text=".").first.wait_for()
         page.get_by_role("button", name="Add", exact=True).click()
         page.get_by_text("a point's name is 1 to 40 letters").wait_for()
+        try_points(page)
         page.get_by_role("button", name="Remove", exact=True).click()
         page.get_by_text("choose a click first").wait_for()
         assert page.locator(".q-notification.bg-warning").count() == 1  # in the place of the one before
@@ -45,6 +46,30 @@ def test_the_cross_digitised_by_one_person(tmp_path):
     expected = last + (last - before) / 4
     assert np.array(grey) == pytest.approx(expected.reshape(-1, 2), abs=0.01)
     assert len(grey) == 3 * len(POINTS)
+
+
+def try_points(page):
+    """Add a point, once more, and drop it; one of the body with clicks is not dropped."""
+    own, add = page.locator(".point", has_text="hand"), page.get_by_role("button", name="Add", exact=True)
+    page.get_by_label("new point").fill("hand")
+    add.click()
+    own.wait_for()
+    page.mouse.click(*at_pixel(page, 0, 300, 200))
+    own.get_by_text("•").wait_for()
+    page.get_by_role("button", name="Compare", exact=True).click()
+    page.get_by_text("not compared, as the body has no such points: hand").wait_for()
+    page.get_by_role("button", name="Close").last.click()
+    add.click()
+    page.get_by_text("hand is among the points already").wait_for()
+    drop = page.get_by_role("button", name="Drop", exact=True)
+    drop.click()
+    page.get_by_text("hand has 1 click; remove").wait_for()
+    page.get_by_role("button", name="Undo").click()
+    own.get_by_text("•").wait_for(state="detached")
+    drop.click()
+    own.wait_for(state="detached")
+    drop.click()
+    page.get_by_text(f"{POINTS[0]} is a point of the body").wait_for()
 
 
 def test_a_click_belongs_to_the_frame_that_it_was_made_in(tmp_path):

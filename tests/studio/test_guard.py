@@ -96,6 +96,14 @@ def test_the_token_becomes_a_cookie_and_leaves_the_address(studio):
     assert {"HttpOnly", "SameSite=Strict"} <= set(headers["set-cookie"].split("; "))
 
 
+def test_an_address_that_is_none_leads_back_to_the_steps(studio):
+    status, headers, body = ask(studio, "/no%3Cb%3E", accept="text/html,*/*")
+    assert (status, headers["content-type"]) == (404, "text/html; charset=utf-8")
+    assert "There is no page /no&lt;b&gt;" in (page := body.decode())
+    assert 'href="/review"' in page
+    assert ask(studio, "/nothing", accept="image/*")[2] == b"not found"
+
+
 def test_other_hosts_and_origins_are_refused(studio):
     assert ask(studio, "/")[0] == 200
     for host in (

@@ -20,7 +20,7 @@ NAMES = {
     "Esc": ["Escape"],
     "Space": [" "],
 }
-POINTER = {"wheel", "drag", "Shift+drag", "click"}
+POINTER = {"wheel", "drag", "Shift+drag", "click", "double-click"}
 COMPARED = re.compile(r"event\.key (?:===?|in|not in) (\"[^\"]+\"|\([^)]*\))|\"(\w+)\"\.includes\(event\.key\)")
 ARROWS = re.compile(r"\b(Arrow\w+):")
 

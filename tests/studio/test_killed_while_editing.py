@@ -72,7 +72,7 @@ def work_until_killed(folder, window, do):
 def add_and_click(window, number):
     """Name two points and click the second."""
     for name in (f"named{number}", f"clicked{number}"):
-        window.get_by_label("another point").fill(name)
+        window.get_by_label("new point").fill(name)
         window.get_by_role("button", name="Add", exact=True).click()
         window.locator(".point.here", has_text=name).wait_for()
     window.mouse.click(*at_pixel(window, PANE, 60 + 25 * number % 600, 60 + 25 * number // 600))

@@ -1,5 +1,6 @@
 """The studio opens again where it was, and with every edit, whenever it is killed."""
 
+import os
 import random
 import shutil
 
@@ -55,8 +56,29 @@ def test_a_folder_is_open_in_one_studio_at_a_time(tmp_path, capsys):
     (folder := tmp_path / "A").mkdir()
     with fork_studio(folder) as address:
         says = refusal(capsys, "studio", folder, "--no-browser")
+        assert (folder / FOLDER / "address").stat().st_mode & 0o077 == 0  # it holds the token
     assert "is open in another studio (process " in says
-    assert address.partition("?")[0].rstrip("/") in says
-    assert "token" not in says
+    assert f"; open {address}, or end it first" in says
     with fork_studio(folder):
         pass
+
+
+def test_a_folder_that_may_not_be_written_is_refused_with_what_to_do(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("os.access", lambda path, mode: mode != os.W_OK)
+    assert "copy the folder to where you may write" in refusal(capsys, "studio", tmp_path, "--no-browser")
+    monkeypatch.chdir(tmp_path)
+    assert "copy the folder to where you may write" in refusal(capsys, "studio", "--demo", "--no-browser")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_trial_that_is_half_written_is_refused_with_its_line_and_where_older_ones_are(tmp_path, capsys):
+    path = tmp_path / "trial.toml"
+    session = Session(tmp_path, path)
+    session.edit("trial.toml", 'name = "a"\n', "first")
+    path.write_text('name = "a"\n\n[[camera]]\nname = "le')
+    assert "at line 4, the end of the file" in (says := refusal(capsys, "studio", path, "--no-browser"))
+    assert "earlier versions" not in says
+    session.edit("trial.toml", 'name = "b"\n', "second")
+    path.write_text('name = "a"\n[[camera\n')
+    assert "at line 2, column 9" in (says := refusal(capsys, "studio", path, "--no-browser"))
+    assert says.rstrip().endswith("; its earlier versions are in .airborne/versions")

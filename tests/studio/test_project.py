@@ -7,8 +7,10 @@ import pytest
 from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
+from airborne.io.folder_lock import sole_writer
 from airborne.studio.project import find_trial, list_measurements, list_runs, read_project, steps
 from airborne.studio.run_names import check_run_name, next_run_name
+from airborne.studio.session import Session
 from tests.support.places import THROWN_CROSS
 
 
@@ -42,6 +44,38 @@ def test_what_is_missing_is_said(tmp_path):
     said = {step.name: step.says for step in steps(read_project(folder, folder / "trial.toml"))}
     assert said["Videos"] == "cam2.mp4 not found"
     assert said["Cameras"] == "click points in cam1, cam2, cam3"
+    (folder / "cross.toml").unlink()
+    assert states(folder)["Body"] == "needs you"
+
+
+def test_a_run_is_ready_once_it_is_finished(tmp_path):
+    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    (run := folder / "results").mkdir()
+    (run / "motion.csv").touch()
+
+    def track_step():
+        step = next(step for step in steps(read_project(folder, folder / "trial.toml")) if step.name == "Track")
+        return step.state, step.says
+
+    assert track_step() == ("needs you", "results, not finished")
+    with sole_writer(run):
+        assert track_step() == ("empty", "results, going on")
+    (run / "summary.json").write_text("{}")
+    assert track_step() == ("ready", "results")
+
+
+def test_what_the_steps_say_is_looked_at_again_after_every_change(tmp_path):
+    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    session, stamps = Session(folder, folder / "trial.toml"), set()
+    for change in (
+        lambda: None,
+        lambda: (folder / "cam2.mp4").unlink(),
+        lambda: (folder / "results").mkdir(),
+        lambda: session.edit("digitised_A_1.csv", "frame\n", "digitised"),
+    ):
+        change()
+        stamps.add(session.stamp)
+    assert len(stamps) == 4
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from airborne.cli.console import Json, progress
+from airborne.cli.console import Json
+from airborne.io.terminal import Stages
 
 
 def export_command(
@@ -34,7 +35,7 @@ def export_command(
     from airborne.run.export import export_run
 
     given = {"c3d": c3d, "trc": trc, "mot": mot, "osim": osim, "gltf": gltf, "bvh": bvh, "csv": csv, "parquet": parquet}
-    with progress("exporting") as report:
+    with Stages() as report:
         exported = export_run(results, output, [kind for kind, is_wanted in given.items() if is_wanted], report)
     if as_json:
         print(json.dumps({"files": [str(path) for path in exported.files], "notes": exported.notes}))

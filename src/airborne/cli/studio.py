@@ -29,10 +29,12 @@ def studio_command(
 
 def _copy_example(folder: Path) -> Path:
     """Copy the thrown cross, without its calibration, start and truth, where there is no copy yet."""
+    from airborne.studio.folder import require_writable
     from airborne.trial.examples import example_trial
 
     source = example_trial("thrown_cross").parent
     if not folder.exists():
+        require_writable(Path.cwd())
         folder.mkdir()
         for name in ("cam1.mp4", "cam2.mp4", "cam3.mp4", "control_points.csv", "cross.toml"):
             shutil.copyfile(source / name, folder / name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -40,7 +40,8 @@ class DigitisedPoses:
     index: NDArray[np.int64]  # (n,)
     position: Array  # (n, 3) [m]
     R: Array  # (n, 3, 3) world from root
-    residual: Array  # (n, points) distance of each point from the fitted body's [m]
+    residual: Array  # (n, points of the body) distance of each from the fitted body's [m]
+    left_out: tuple[str, ...] = ()  # points that were clicked but are not of the body
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +51,7 @@ class DigitisedComparison:
     tracked_minus_digitised: MotionComparison
     rigid_fit_residual_rms_mm: float
     n_poses: int  # digitised
+    left_out: tuple[str, ...] = ()  # points that were clicked but are not of the body
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
@@ -57,12 +59,18 @@ class DigitisedComparison:
             "tracked_minus_digitised": self.tracked_minus_digitised.to_dict(),
             "rigid_fit_residual_rms_mm": self.rigid_fit_residual_rms_mm,
             "n_poses": self.n_poses,
+            **({"points_left_out": list(self.left_out)} if self.left_out else {}),
         }
 
     def describe(self) -> str:
         """Return the numbers as a short plain table."""
         fit = f"{self.n_poses} digitised poses; rigid fit residual RMS {self.rigid_fit_residual_rms_mm:.2f} mm"
-        return f"{fit}\n{self.tracked_minus_digitised.describe()}"
+        return "\n".join([fit, *describe_left_out(self.left_out), self.tracked_minus_digitised.describe()])
+
+
+def describe_left_out(points: Sequence[str]) -> list[str]:
+    """Name points that the body does not have, in a line where there are some."""
+    return [f"not compared, as the body has no such points: {', '.join(points)}"] if points else []
 
 
 def read_digitised(path: Path, rig: Rig) -> DigitisedPoints:
@@ -118,8 +126,14 @@ def body_points(model: BodyModel, points: Sequence[str]) -> Array:
     `<stem>_minus` and `<stem>_plus` are the ends of the longest axis of the box whose part's name begins with the
     stem. Raises ResultError unless exactly one box matches.
     """
+    boxes = _boxes(model)
+    return np.stack([_box_end(point, boxes) for point in points])
+
+
+def _boxes(model: BodyModel) -> dict[str, tuple[Array, Array]]:
+    """Return the centre and half of the longest axis of each box, in the root's frame, all joints at zero [m]."""
     posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
-    boxes: dict[str, tuple[Array, Array]] = {}  # centre and half of the longest axis
+    boxes = {}
     for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True):
         for part in segment.parts:
             if isinstance(part.shape, Box):
@@ -127,19 +141,25 @@ def body_points(model: BodyModel, points: Sequence[str]) -> Array:
                 segment_from_part = part.segment_from_part
                 centre = R @ segment_from_part.translation + t
                 boxes[part.name] = (centre, R @ segment_from_part.rotation.apply(half))
-    return np.stack([_box_end(point, boxes) for point in points])
+    return boxes
 
 
 def fit_digitised_poses(digitised: DigitisedPoints, rig: Rig, model: BodyModel) -> DigitisedPoses:
-    """Triangulate the clicked points and fit the rigid body to them, weighted by their numbers of views."""
-    on_body = body_points(model, digitised.points)
-    in_world = rig.points_from_px(digitised.px)
-    n_views = np.isfinite(digitised.px).all(axis=-1).sum(axis=-1)
+    """Triangulate the clicked points and fit the rigid body to them, weighted by their numbers of views.
+
+    Points that are no ends of its boxes are left out; raises ResultError where none is.
+    """
+    names, boxes = digitised.points, _boxes(model)
+    of_body = [k for k, name in enumerate(names) if len(_matches(name, boxes)) == 1] or list(range(len(names)))
+    on_body, px = body_points(model, [names[k] for k in of_body]), digitised.px[:, of_body]
+    in_world, n_views = rig.points_from_px(px), np.isfinite(px).all(axis=-1).sum(axis=-1)
     fits = [fit_rigid(on_body, points, views) for points, views in zip(in_world, n_views, strict=True)]
     R, position = np.stack([fit[0] for fit in fits]), np.stack([fit[1] for fit in fits])
     fitted = np.einsum("nij,pj->npi", R, on_body) + position[:, None]
     residual = np.linalg.norm(fitted - in_world, axis=-1)
-    return DigitisedPoses(index=digitised.index, position=position, R=R, residual=residual)
+    clicked = np.flatnonzero(np.isfinite(digitised.px).any(axis=(0, 2, 3))).tolist()
+    left_out = tuple(names[k] for k in clicked if k not in of_body)
+    return DigitisedPoses(index=digitised.index, position=position, R=R, residual=residual, left_out=left_out)
 
 
 def compare_digitised(motion: Motion, poses: DigitisedPoses, symmetries: Sequence[Array]) -> DigitisedComparison:
@@ -167,6 +187,7 @@ def compare_digitised(motion: Motion, poses: DigitisedPoses, symmetries: Sequenc
         tracked_minus_digitised=compare_motion(unrated, truth, symmetries),
         rigid_fit_residual_rms_mm=float(1e3 * np.sqrt(np.nanmean(poses.residual**2))),
         n_poses=int(is_known.sum()),
+        left_out=poses.left_out,
     )
 
 
@@ -195,9 +216,14 @@ def _point_and_camera(path: Path, name: str, cameras: Sequence[str]) -> tuple[st
     raise ResultError(f"{path}: column {name} is no <point>_<camera>_u or _v; cameras: {', '.join(cameras)}")
 
 
-def _box_end(point: str, boxes: dict[str, tuple[Array, Array]]) -> Array:
+def _matches(point: str, boxes: Iterable[str]) -> list[str]:
+    """Return the boxes of which a point may be an end."""
     stem, _, end = point.rpartition("_")
-    matches = [name for name in boxes if name.startswith(stem)] if stem and end in ("minus", "plus") else []
+    return [name for name in boxes if name.startswith(stem)] if stem and end in ("minus", "plus") else []
+
+
+def _box_end(point: str, boxes: dict[str, tuple[Array, Array]]) -> Array:
+    matches = _matches(point, boxes)
     if len(matches) != 1:
         listed = ", ".join(boxes) or "none"
         raise ResultError(
@@ -205,4 +231,4 @@ def _box_end(point: str, boxes: dict[str, tuple[Array, Array]]) -> Array:
             f"with one of the boxes: {listed}"
         )
     centre, half = boxes[matches[0]]
-    return centre + half if end == "plus" else centre - half
+    return centre + half if point.endswith("_plus") else centre - half

@@ -116,6 +116,12 @@ def joint_path_variables(paths: JointPaths, model: BodyModel) -> Variables:
     )
 
 
+def unknown_markers(paths: JointPaths, model: BodyModel) -> list[str]:
+    """Return the names of those paths for which a body has no landmark."""
+    names = {landmark.name for landmark in model.landmarks}
+    return [name for name in paths.names if not {name, landmark_of(name)} & names]
+
+
 def read_joint_angles(path: Path) -> Variables:
     """Read joint angles: `time_s` and `<joint>_x_rad`, `_y_rad`, `_z_rad`. Raises ResultError in one line."""
     table = read_table(path, _EXPECTED)

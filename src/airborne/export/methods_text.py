@@ -33,6 +33,7 @@ def describe_methods(summary: Mapping[str, Any]) -> str:
     rate = f" at {summary['rate_hz']:.5g} Hz" if summary.get("rate_hz") else ""
     tracked, unsure, lost = (summary[f"n_{status}"] for status in ("tracked", "uncertain", "lost"))
     text.append(f"At {times}{rate}, {count(tracked, 'pose')} were tracked, {unsure} were uncertain and {lost} lost.")
+    text += describe_corrections(summary)
     sds = [
         f"{summary[key]:.1f} {unit} in {name}"
         for key, unit, name in (
@@ -50,6 +51,34 @@ def describe_methods(summary: Mapping[str, Any]) -> str:
     text += [f"The run's check of itself reported: {each.rstrip('.')}." for each in alarms]
     others = ", ".join(f"{name} {number}" for name, number in versions.items() if name != "airborne")
     return " ".join([*text, *([f"Versions: {others}."] if others else [])])
+
+
+def describe_corrections(summary: Mapping[str, Any]) -> list[str]:
+    """Return in which frames the pose was given beside the images, how surely, and which images were left out."""
+    keys, masks, text = summary.get("keys") or [], summary.get("masks") or [], list[str]()
+    if keys:
+        by_form: dict[str, list[str]] = {}
+        for key in keys:
+            by_form.setdefault(_forms(key), []).append(str(key["frame"]))
+        groups = ", ".join(f"{_listed(frames)} ({form})" for form, frames in by_form.items())
+        text.append(f"The pose was corrected in {count(len(keys), 'frame')}: {groups}.")
+    stretches: dict[str, list[str]] = {}
+    for mask in masks:
+        first, last = mask["first"], mask["last"]
+        stretches.setdefault(mask["camera"], []).append(str(first) if first == last else f"{first} to {last}")
+    left_out = "; ".join(f"{camera} of {_listed(frames)}" for camera, frames in stretches.items())
+    return [*text, *([f"Cameras were left out of some frames: {left_out}."] if masks else [])]
+
+
+def _forms(key: Mapping[str, Any]) -> str:
+    """Return what a key gives, and with which standard deviations."""
+    units = {"sd_px": (1, "px"), "sd_m": (1000, "mm"), "sd_deg": (1, "°")}
+    sds = [f"± {factor * key[name]:g} {unit}" for name, (factor, unit) in units.items() if name in key]
+    return f"{' and '.join(key['gives'])}, {' and '.join(sds)}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _span(values: Sequence[float], form: str) -> str:

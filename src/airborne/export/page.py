@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from airborne.export.methods_text import describe_corrections
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.tracking import Status
 from airborne.tracking.methods import UNREAD_SETTINGS
@@ -42,6 +43,7 @@ def render_report(
     """
     shares = [(str(status), summary[f"n_{status}"], hex_colour(STATUS_RGB[status])) for status in Status]
     shared = {"summary": summary, "alarms": alarms, "fine_text": fine_text, "definitions": definitions}
+    shared["corrections"] = describe_corrections(summary)
     return _environment().get_template(template).render(shared | values, shares=shares)
 
 

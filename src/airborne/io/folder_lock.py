@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,12 +11,14 @@ from datetime import datetime
 from pathlib import Path
 
 from airborne.errors import ResultError
+from airborne.io.text import read_text
 
 try:
     import fcntl
 except ImportError:  # Windows: nothing is locked there
     fcntl = None
 
+_LONGEST_HOLDER = 200  # bytes of what a holder says of itself
 LOCK = "run.lock"  # without a process that holds it, the file means nothing
 
 
@@ -46,6 +49,19 @@ def sole_writer(folder: Path, address: str = "") -> Iterator[None]:
         os.close(file)
 
 
+def find_writer(folder: Path) -> int | None:
+    """Return the process of this user, on this computer, that is the folder's only writer; None where none is."""
+    try:
+        text = read_text(folder / LOCK, _LONGEST_HOLDER)
+        found = re.match(rf"process (\d+) on {re.escape(socket.gethostname())} ", text)
+        if found is None or fcntl is None:
+            return None
+        os.kill(process := int(found[1]), 0)  # raises where there is none
+    except (OSError, ValueError, OverflowError):
+        return None
+    return process
+
+
 def _lock(folder: Path) -> int:
     """Return the locked file, open; one that its last holder has just removed is made anew."""
     path = folder / LOCK
@@ -59,7 +75,7 @@ def _lock(folder: Path) -> int:
         except FileNotFoundError:
             pass
         except BlockingIOError:
-            holder = os.read(file, 200).decode(errors="replace")
+            holder = os.read(file, _LONGEST_HOLDER).decode(errors="replace")
             os.close(file)
             raise _refusal(folder, holder) from None
         os.close(file)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -9,7 +10,9 @@ from contextlib import ExitStack, contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-seconds_a_line = 5.0  # between lines of progress where no terminal shows a bar; a program that reads them wants more
+WATCHED = "AIRBORNE_WATCHED"  # set by a program that shows the last line of progress to its user
+_SECONDS_A_LINE = 0.5 if WATCHED in os.environ else 5.0  # between lines of progress where no terminal shows a bar
+_SECONDS_BEFORE = 0.0 if WATCHED in os.environ else 5.0  # the first
 
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -30,11 +33,11 @@ class _ProgressLines:
     """Progress as plain lines."""
 
     def __init__(self, what: str) -> None:
-        self._what, self._next_s = what, time.monotonic() + seconds_a_line
+        self._what, self._next_s = what, time.monotonic() + _SECONDS_BEFORE
 
     def __call__(self, done: int, total: int | None) -> None:
         if time.monotonic() >= self._next_s:
-            self._next_s = time.monotonic() + seconds_a_line
+            self._next_s = time.monotonic() + _SECONDS_A_LINE
             errors.print(f"{self._what}: {done} of {total or 'unknown'}", markup=False)
 
 

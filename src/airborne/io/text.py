@@ -139,13 +139,14 @@ def parse_editable_toml(text: str) -> tomlkit.TOMLDocument:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Parse TOML. Raises TOMLDecodeError for whatever the parser stumbles over."""
+    """Parse TOML. Raises TOMLDecodeError, with the line, for whatever the parser stumbles over."""
     if _DEEP_KEY.search(text):
         raise tomllib.TOMLDecodeError("nested too deep")
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        raise
+    except tomllib.TOMLDecodeError as error:
+        end = f"at line {len(text.splitlines())}, the end of the file"
+        raise tomllib.TOMLDecodeError(str(error).replace("at end of document", end)) from None
     except (RecursionError, ValueError, OverflowError) as error:
         reason = "nested too deep" if isinstance(error, RecursionError) else str(error)[:120]
         raise tomllib.TOMLDecodeError(reason) from None

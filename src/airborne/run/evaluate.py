@@ -27,6 +27,7 @@ from airborne.evaluation import (
     compare_digitised,
     compare_joints,
     compare_motion,
+    describe_left_out,
     fit_digitised_poses,
     read_digitised,
     read_joint_paths,
@@ -123,6 +124,7 @@ class AgreementReport:
     agreements: dict[str, list[Agreement]]
     repeats: dict[str, list[Repeatability]]
     headlines: frozenset[str]  # names of the headline variables
+    left_out: tuple[str, ...]  # points of the references that the body does not have
     folder: Path
     files: tuple[str, ...]  # in it
 
@@ -135,7 +137,7 @@ class AgreementReport:
 
     def describe(self) -> str:
         """Return the headline variables as short plain tables."""
-        lines = []
+        lines = describe_left_out(self.left_out)
         for name, rows in self.agreements.items():
             lines += [f"agreement with {name}", agreement_table([row for row in rows if row.name in self.headlines])]
         for name, rows in self.repeats.items():
@@ -169,8 +171,9 @@ def evaluate_agreement(
         if digitised or joints or joint_angles:
             raise ResultError(f"{folder} holds a run of players; give a truth.csv of players, or other runs of it")
         references, repeated = players_series(folder, truth, repeats)
+        left_out: list[str] = []
     else:
-        references, repeated = body_series(
+        references, repeated, left_out = body_series(
             folder,
             truth,
             digitised=digitised,
@@ -209,7 +212,7 @@ def evaluate_agreement(
             _read_earlier(out / _METHODS),
         )
         write_text(out / _METHODS, text)
-    return AgreementReport(agreements, repeatable, first, out, (*files, _METHODS))
+    return AgreementReport(agreements, repeatable, first, tuple(left_out), out, (*files, _METHODS))
 
 
 def _read_earlier(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from airborne.export.trc import write_trc
 from airborne.io.parquet import CAN_WRITE_PARQUET
 from airborne.motion import Motion, has_inertias, landmarks, measure_flight
 from airborne.motion.run_folder import holds_players, note_if_unfinished, read_body_run, read_players_run
-from airborne.types import Array, Progress
+from airborne.types import Array, Progress, StageProgress
 
 EXPORT_FORMATS = ("c3d", "trc", "mot", "osim", "gltf", "bvh", "csv", "parquet")
 _TABLE_FORMATS = ("csv", "parquet")
@@ -49,7 +50,7 @@ class _RunData:
 
 
 def export_run(
-    folder: Path, output: Path | None = None, formats: Sequence[str] = (), progress: Progress | None = None
+    folder: Path, output: Path | None = None, formats: Sequence[str] = (), progress: StageProgress | None = None
 ) -> ExportResult:
     """Write a run's files in `formats`, by default all EXPORT_FORMATS, into `output` or the run's folder `export`.
 
@@ -60,7 +61,8 @@ def export_run(
     if "parquet" in formats and not CAN_WRITE_PARQUET:
         raise ResultError(f"{_NO_PARQUET}, or write csv")
     wanted = [format for format in EXPORT_FORMATS if format in formats] or list(EXPORT_FORMATS)
-    read = _read(folder, any(format in _TABLE_FORMATS for format in wanted), progress or (lambda done, total: None))
+    say = progress or (lambda what, done, total: None)
+    read = _read(folder, any(format in _TABLE_FORMATS for format in wanted), partial(say, "measuring"))
     jitter, notes = max(take.jitter_s * float(take.rate) for take in read.takes), list(read.notes)
     if "parquet" in wanted and not CAN_WRITE_PARQUET:
         wanted.remove("parquet")
@@ -75,7 +77,10 @@ def export_run(
     target = folder / "export" if output is None else output
     target.mkdir(parents=True, exist_ok=True)
     stem = portable_names([folder.resolve().name])[0]
-    files = [path for format in wanted for path in _write(format, target, stem, read)]
+    files: list[Path] = []
+    for done, format in enumerate(wanted):
+        say(f"writing {format}", done, len(wanted))
+        files += _write(format, target, stem, read)
     unfinished = [note for note in [note_if_unfinished(folder)] if note is not None]
     gaps = _gap_notes(read.takes, bool({"mot", "bvh"} & set(wanted)))
     return ExportResult(tuple(files), (*notes, *gaps, *unfinished))

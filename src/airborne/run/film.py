@@ -42,6 +42,8 @@ def write_film(
     """
     if path.suffix.lower() not in _WIDEST_PX:
         raise ResultError(f"{path}: films are .mp4 or .gif; name it so")
+    if first is not None and last is not None and first > last:
+        raise ResultError(f"frames {first} to {last}: the first frame must come before the last; exchange them")
     index, time_s, series = _read(folder)
     first = int(index[0]) if first is None else first
     last = int(index[-1]) if last is None else last
@@ -147,6 +149,6 @@ def _write(path: Path, pictures: Iterator[Image], rate: Fraction) -> None:
                 writer.write(picture)
         return
     step = -(-rate // _MOST_GIF_HZ)  # pictures left out
-    kept = [GifPicture.fromarray(first)]
-    kept += [GifPicture.fromarray(picture) for k, picture in enumerate(pictures, start=1) if k % step == 0]
-    kept[0].save(path, save_all=True, append_images=kept[1:], duration=round(1000 * step / rate), loop=0)
+    later = (GifPicture.fromarray(picture) for k, picture in enumerate(pictures, start=1) if k % step == 0)
+    duration_ms = round(1000 * step / rate)
+    GifPicture.fromarray(first).save(path, save_all=True, append_images=later, duration=duration_ms, loop=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,9 +32,11 @@ from airborne.evaluation.variables import (
     players_variables,
     read_joint_angles,
     root_variables,
+    unknown_markers,
 )
 from airborne.motion import Motion, run_folder
 from airborne.motion.run_folder import read_body_run, read_players_run
+from airborne.types import Array
 
 SeriesByReference = dict[str, list[Series]]
 
@@ -65,10 +68,11 @@ def body_series(
     joint_angles: Path | None,
     repeats: Sequence[Path],
     operators: Sequence[Path],
-) -> tuple[SeriesByReference, SeriesByReference]:
-    """Return the series of a body beside each reference, and of repeated runs or operators."""
+) -> tuple[SeriesByReference, SeriesByReference, list[str]]:
+    """Return the series of a body beside each reference, and of repeated runs or operators; and points left out."""
     motion, model = read_body_run(folder)
     symmetry, references, repeated = symmetries(model), SeriesByReference(), SeriesByReference()
+    left_out: list[str] = []
     if truth is not None:
         true = read_truth(truth)
         aligned = align_symmetry(motion, true.R, true.time_s, symmetry)
@@ -77,7 +81,9 @@ def body_series(
             [root_variables(motion.time_s, motion.position, aligned), reference], "the run and its truth"
         )
     if joints is not None:
-        paths = joint_path_variables(read_joint_paths(joints), model)
+        read = read_joint_paths(joints)
+        left_out += unknown_markers(read, model)
+        paths = joint_path_variables(read, model)
         references["the joints"] = common_series([motion_variables(motion, model), paths], "the run and the joints")
     if joint_angles is not None:
         true_angles = read_joint_angles(joint_angles)
@@ -89,24 +95,34 @@ def body_series(
         clicked = [
             _poses_from_clicks(path, rig, model, motion=motion, symmetry=symmetry) for path in (digitised, *operators)
         ]
-        tracked = root_variables(motion.time_s, motion.position, clicked[0][1])
-        references["points digitised"] = common_series([tracked, clicked[0][0]], "the run and the clicked points")
+        tracked = root_variables(motion.time_s, motion.position, clicked[0].R)
+        references["points digitised"] = common_series([tracked, clicked[0].poses], "the run and the clicked points")
+        left_out += dict.fromkeys(name for each in clicked for name in each.left_out)
         if operators:
-            repeated["operators"] = common_series([each for each, _ in clicked], "the people's clicks")
+            repeated["operators"] = common_series([each.poses for each in clicked], "the people's clicks")
     if repeats:
         others = [read_body_run(other)[0] for other in repeats]
         same = [replace(each, R=align_symmetry(each, motion.R, motion.time_s, symmetry)) for each in others]
         repeated["runs"] = common_series([motion_variables(each, model) for each in (motion, *same)], "the runs")
-    return references, repeated
+    return references, repeated, left_out
+
+
+class _ClickedPoses(NamedTuple):
+    """One person's clicked poses at the motion's times."""
+
+    poses: Variables
+    R: Array  # (n, 3, 3) of the motion, aligned with them by symmetry
+    left_out: tuple[str, ...]  # points
 
 
 def _poses_from_clicks(
     path: Path, rig: Rig, model: BodyModel, *, motion: Motion, symmetry: Sequence[np.ndarray]
-) -> tuple[Variables, np.ndarray]:
-    """Return one person's clicked poses at the motion's times, and the motion's R aligned with them by symmetry."""
+) -> _ClickedPoses:
+    """Fit the body to one person's clicks. Raises ResultError for those of another recording."""
     poses = fit_digitised_poses(read_digitised(path, rig), rig, model)
     _, frames, rows = np.intersect1d(motion.index, poses.index, return_indices=True)
     if not len(frames):
         raise ResultError(f"{path} has no frame of this run; give the clicks of this recording")
     time_s, R = motion.time_s[frames], poses.R[rows]
-    return root_variables(time_s, poses.position[rows], R), align_symmetry(motion, R, time_s, symmetry)
+    aligned = align_symmetry(motion, R, time_s, symmetry)
+    return _ClickedPoses(root_variables(time_s, poses.position[rows], R), aligned, poses.left_out)

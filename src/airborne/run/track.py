@@ -22,6 +22,7 @@ from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
+from airborne.run.corrections import corrections_of
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
@@ -134,6 +135,7 @@ def _run_alone(subject: Subject[Found, AnyMotion], options: _Options, connection
     connection.close()
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder)
+    summary |= corrections_of(subject.trial, motion.index.tolist())
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += [*subject.warnings(), *alarms(summary.get("self_check", []))]
     if options.drawn is not None:

@@ -2,43 +2,52 @@
 
 from __future__ import annotations
 
+import io
+import math
+import os
 import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
+from airborne.io.folder_lock import LOCK, find_writer
+from airborne.io.terminal import WATCHED
+from airborne.motion.run_folder import SUMMARY
 from airborne.studio.writing import FOLDER
 
-_RUN = (
-    "import sys; sys.argv[0] = 'airborne'; from airborne.io import terminal; terminal.seconds_a_line = 0.5; "
-    "from airborne.cli import main; main()"
-)
+_RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 _numbers = count(1)  # of the commands: two exports may run at once
 _PATIENCE_S = 10.0  # for a process that was told to stop
+_LONGEST_LINE = 4096  # bytes: of a run of hours there are many lines
+_SOON_S = 0.05  # between looks whether it has
 
 
 class Command:
     """One command, running or ended."""
 
-    def __init__(self, words: Sequence[str], folder: Path) -> None:
-        """Start `airborne` with these words in a folder."""
+    def __init__(self, words: Sequence[str], folder: Path, other: OtherProcess | None = None) -> None:
+        """Start `airborne` with these words in a folder, or look at an `other` process that does what they say."""
         self.words = tuple(words)
-        self.started_s, self._began_s = time.monotonic(), time.time()
+        self.is_own = other is None  # it ends with the studio
+        age_s = 0.0 if other is None else other.age_s
+        self.started_s, self._began_s = time.monotonic() - age_s, time.time() - age_s
         self._out: bytes = b""
         self.is_told = False  # a page has shown what came of it
         self._log = folder / FOLDER / f"{words[0]}_{next(_numbers)}.log"
         self._log.parent.mkdir(exist_ok=True)
         with self._log.open("wb") as log:
-            self._process = subprocess.Popen(
+            self._process = other or subprocess.Popen(
                 [sys.executable, "-c", _RUN, *words],
                 cwd=folder,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=log,
+                env=os.environ | {WATCHED: "yes"},
             )
 
     @property
@@ -70,11 +79,13 @@ class Command:
 
     def complaint(self) -> str:
         """Return the last line of an ended command's errors."""
-        return self.progress() or f"it ended with the code {self.code}"
+        return self.progress() or "it ended early" + (f", with the code {self.code}" if self.is_own else "; go on")
 
     def progress(self) -> str:
         """Return the last line of what it says beside its output."""
-        return self._log.read_text(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
+        with self._log.open("rb") as log:
+            log.seek(max(0, self._log.stat().st_size - _LONGEST_LINE))
+            return log.read().decode(errors="replace").strip().rpartition("\n")[2].removeprefix("airborne: ")
 
     def how_far(self) -> str:
         """Return the last line of what it says beside its output; of one that counts, the numbers."""
@@ -98,3 +109,48 @@ class Command:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
+
+
+class OtherProcess:
+    """The process that writes a run and is not ours: a studio that was killed left it, or a terminal started it."""
+
+    def __init__(self, run: Path, number: int) -> None:
+        """Look at the process of a number for as long as it is the run's writer."""
+        self._run, self._number = run, number
+        self.stdout = io.BytesIO(b"ended\n")  # what it printed went elsewhere
+
+    @property
+    def age_s(self) -> float:
+        """How long it has been writing."""
+        return max(time.time() - (self._run / LOCK).stat().st_mtime, 0.0)
+
+    def poll(self) -> int | None:
+        """Return None while it goes on, then whether it ended early."""
+        return None if find_writer(self._run) == self._number else int(not (self._run / SUMMARY).is_file())
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal."""
+        with suppress(ProcessLookupError):
+            os.kill(self._number, number)
+
+    def kill(self) -> None:
+        """End it at once."""
+        self.send_signal(signal.SIGKILL)
+
+    def wait(self, timeout: float | None = None) -> None:
+        """Wait for its end. Raises TimeoutExpired."""
+        end_s = math.inf if timeout is None else time.monotonic() + timeout
+        while self.poll() is None:
+            if time.monotonic() > end_s:
+                raise subprocess.TimeoutExpired(str(self._number), timeout or 0.0)
+            time.sleep(_SOON_S)
+
+
+def find_tracking(folder: Path, trial: Path) -> Command | None:
+    """Return the command that tracks into a run of the folder and is not ours, where one does."""
+    for lock in sorted(folder.glob(f"*/{LOCK}")):
+        run, number = lock.parent, find_writer(lock.parent)
+        if number is not None and run.name != FOLDER and not run.is_symlink():
+            with suppress(FileNotFoundError):  # it has just ended
+                return Command(["track", trial.name, "-o", run.name], folder, OtherProcess(run, number))
+    return None

@@ -81,6 +81,17 @@ def add_points(table: DigitisedPoints, points: Sequence[str]) -> DigitisedPoints
     return replace(table, points=(*table.points, *new), px=px)
 
 
+def without_point(table: DigitisedPoints, point: str) -> DigitisedPoints:
+    """Return the table without a point."""
+    kept = [name for name in table.points if name != point]
+    return replace(table, points=tuple(kept), px=table.px[:, [table.points.index(name) for name in kept]])
+
+
+def count_clicks(table: DigitisedPoints, point: str) -> int:
+    """Return how often a point is clicked, in all frames and cameras."""
+    return int(np.isfinite(table.px[:, table.points.index(point), :, 0]).sum())
+
+
 def clicks_of_frame(table: DigitisedPoints, frame: int, cameras: Sequence[str]) -> Clicked:
     """Return the clicks of one frame."""
     rows = np.flatnonzero(table.index == frame)

@@ -21,6 +21,15 @@ def is_inside(folder: Path, path: Path) -> bool:
         return False
 
 
+def require_writable(folder: Path) -> None:
+    """Raise TrialError for a folder in which nothing may be written: the studio keeps all that it does there."""
+    if folder.is_dir() and not os.access(folder, os.W_OK):
+        raise TrialError(
+            f"{folder} may not be written, and the studio writes what you do into it; copy the folder to where you "
+            "may write, or get the right to write here"
+        )
+
+
 def path_inside(folder: Path, name: str) -> Path:
     """Return the path of a file that something in the folder names; raises TrialError for one outside of it."""
     path = folder / name

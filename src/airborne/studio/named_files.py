@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import glob
+import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +13,7 @@ from airborne.body.files import mesh_files
 from airborne.errors import AirborneError, TrialError
 from airborne.io.text import read_toml
 from airborne.studio.folder import path_inside
+from airborne.studio.writing import FOLDER
 from airborne.trial.file import read_tables
 
 _OF_POSE = ("joints_m", "points_px", "detections")
@@ -30,7 +33,7 @@ def read_inner_tables(folder: Path, path: Path) -> dict[str, Any]:
     path_inside(folder, path.name)
     with suppress(OSError, ValueError):  # what is wrong is said below
         _refuse_outer(folder, path, "session", read_toml(path).get("session"))
-    tables, base = read_tables(path)
+    tables, base = _read_tables(folder, path)
     if base != path.parent:
         raise TrialError(f"{path.name}: its session is in another folder; put the trial beside it")
     for key, name in _named(tables):
@@ -39,6 +42,17 @@ def read_inner_tables(folder: Path, path: Path) -> dict[str, Any]:
     if isinstance(file, str):
         refuse_outer_meshes(folder, path.parent / file)
     return tables
+
+
+def _read_tables(folder: Path, path: Path) -> tuple[dict[str, Any], Path]:
+    """Read a trial's tables; of a file that is no TOML, half written, say, the error says where older ones are."""
+    try:
+        return read_tables(path)
+    except TrialError as error:
+        has_older = any((folder / FOLDER / "versions").glob(f"{glob.escape(path.name)}.*"))
+        if not (has_older and isinstance(error.__cause__, tomllib.TOMLDecodeError)):
+            raise
+        raise TrialError(f"{error}; its earlier versions are in {FOLDER}/versions") from None
 
 
 def refuse_outer_meshes(folder: Path, body: Path) -> None:

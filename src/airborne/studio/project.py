@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from airborne.body import BodyModel, read_measurements
 from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError, one_line
+from airborne.io.folder_lock import find_writer
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
 from airborne.studio.clicks import count_clicked, read_clicked
 from airborne.studio.folder import files_inside, outer_links, path_inside, readable_files
@@ -180,11 +181,7 @@ def _steps(project: Project) -> Iterator[StudioStep]:
     else:
         yield StudioStep("Videos", "/", "needs you", project.mistake or "choose the cameras")
     yield StudioStep("Cameras", "/cameras", *_cameras_state(project))
-    body = project.table("body")
-    what = body.get("file") or body.get("preset") or body.get("measurements")
-    yield StudioStep(
-        "Body", "/body", "ready" if what else "needs you" if n else "empty", str(what or "choose what is tracked")
-    )
+    yield StudioStep("Body", "/body", *_body_state(project))
     yield StudioStep("First pose", "/start", *_start_state(project))
     yield from _run_steps(project)
 
@@ -210,6 +207,16 @@ def _cameras_state(project: Project) -> tuple[StepState, str]:
     return ("needs you", f"click points in {', '.join(few)}") if few else ("ready", "control points")
 
 
+def _body_state(project: Project) -> tuple[StepState, str]:
+    body = project.table("body")
+    file = body.get("file") or body.get("measurements")
+    if file and not (project.folder / str(file)).is_file():
+        return "needs you", f"{file} not found"
+    if what := file or body.get("preset"):
+        return "ready", str(what)
+    return ("needs you" if project.cameras else "empty"), "choose what is tracked"
+
+
 def _start_state(project: Project) -> tuple[StepState, str]:
     start = project.table("start")
     if start and not start.get("find"):
@@ -226,7 +233,9 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
     if finished:
         yield StudioStep("Track", "/track", "ready", finished[0].name)
     elif runs:
-        yield StudioStep("Track", "/track", "needs you", f"{runs[0].name} is not finished")
+        is_going_on = find_writer(runs[0]) is not None
+        says = f"{runs[0].name}, {'going on' if is_going_on else 'not finished'}"
+        yield StudioStep("Track", "/track", "empty" if is_going_on else "needs you", says)
     else:
         yield StudioStep("Track", "/track", "needs you" if is_prepared else "empty", "follow the body")
     yield StudioStep("Review", "/review", "ready" if finished else "empty", runs[0].name if runs else "no run yet")

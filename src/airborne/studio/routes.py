@@ -22,6 +22,7 @@ from airborne.studio.calibrating import find_picture
 from airborne.studio.curve_data import run_curves
 from airborne.studio.field_order import ORDERS, order_jpeg
 from airborne.studio.guard import FILE_POLICY, REPORT_POLICY
+from airborne.studio.not_found import not_found_html
 from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.pictures import SHRINKS
 from airborne.studio.project import find_run, list_videos
@@ -53,6 +54,12 @@ class Wish(NamedTuple):
 
 def add_routes(app: FastAPI, session: Session) -> None:
     """Add the routes of a session; every name in an address is one of a list, none is a path."""
+
+    @app.exception_handler(404)
+    async def not_found(request: Request, error: Exception) -> Response:
+        is_page = "text/html" in request.headers.get("accept", "")
+        text = not_found_html(session, request.url.path) if is_page else "not found"
+        return Response(text, status_code=404, media_type="text/html" if is_page else "text/plain")
 
     @app.get("/image/{camera}/{frame}")
     async def image(request: Request, camera: int, frame: int, *, shrink: int = 1, near: bool = False) -> Response:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import math
+import os
 import secrets
 import socket
 import webbrowser
@@ -18,7 +19,9 @@ from nicegui.server import Server
 
 from airborne.errors import AirborneError, TrialError
 from airborne.io.folder_lock import InUseError, sole_writer
+from airborne.io.text import read_text
 from airborne.studio.curve_data import run_curves
+from airborne.studio.folder import require_writable
 from airborne.studio.guard import Guard
 from airborne.studio.pages.body import body_page
 from airborne.studio.pages.cameras import cameras_page
@@ -37,6 +40,7 @@ from airborne.studio.session import Session
 from airborne.studio.writing import FOLDER
 
 _HOST = "127.0.0.1"
+_ADDRESS, _LONGEST_ADDRESS = "address", 200  # the file that holds it; bytes
 _SOON_S = 0.05  # between looks whether the server listens
 _PATIENCE_S = 20.0  # for a window whose computer is busy: sooner taken for closed, it would begin anew
 _STYLE = Path(__file__).with_name("studio.css")
@@ -61,18 +65,36 @@ def serve(path: Path, *, port: int, browser: bool, is_guided: bool) -> None:
     A folder that another studio has open is refused: what one undoes, the other would not know.
     """
     session, port = Session(*find_trial(path), is_guided=is_guided), _free_port(port)
+    require_writable(session.folder)
+    home, token = f"http://{_HOST}:{port}", secrets.token_urlsafe(24)
     try:
-        with sole_writer(session.folder / FOLDER, f"http://{_HOST}:{port}"):
-            _serve(session, port, browser=browser)
+        with sole_writer(session.folder / FOLDER, home):
+            _keep_address(session.folder, f"{home}/?token={token}")
+            _serve(session, port, token, browser=browser)
     except InUseError as error:
+        known = _read_address(session.folder)
+        where = f"open {known}" if known.partition("/?")[0] in error.holder.split() else "go on in its window"
         raise TrialError(
-            f"{session.folder} is open in another studio ({error.holder or 'just started'}); go on in its window, "
-            "or end it first"
+            f"{session.folder} is open in another studio ({error.holder or 'just started'}); {where}, or end it first"
         ) from None
 
 
-def _serve(session: Session, port: int, *, browser: bool) -> None:
-    token = secrets.token_urlsafe(24)
+def _keep_address(folder: Path, address: str) -> None:
+    """Keep the address, with its token, where this user alone may read it: for whoever opens the folder again."""
+    path = folder / FOLDER / _ADDRESS
+    path.unlink(missing_ok=True)
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+        file.write(address)
+
+
+def _read_address(folder: Path) -> str:
+    try:
+        return read_text(folder / FOLDER / _ADDRESS, _LONGEST_ADDRESS)
+    except (OSError, ValueError):
+        return ""
+
+
+def _serve(session: Session, port: int, token: str, *, browser: bool) -> None:
     here = session.place.page if session.place.page in _PAGES else "/"
     address = f"http://{_HOST}:{port}{here}?token={token}"
     for url, build in _PAGES.items():
@@ -94,7 +116,7 @@ def _serve(session: Session, port: int, *, browser: bool) -> None:
     binding.MAX_PROPAGATION_TIME = math.inf  # [s]; beyond it NiceGUI writes a line for developers to the terminal
     app.on_startup(announce)
     app.on_shutdown(session.pictures.prefetch.close)
-    app.on_shutdown(lambda: [command.stop() for command in session.commands.values()])
+    app.on_shutdown(lambda: [command.stop() for command in session.commands.values() if command.is_own])
     ui.run(
         host=_HOST,
         port=port,

@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
 from airborne.run.opening import calibrated_cameras
-from airborne.studio.commands import Command
+from airborne.studio.commands import Command, find_tracking
 from airborne.studio.drafts import DRAFTS, drafts_text, read_draft
 from airborne.studio.folder import file_stamp, path_inside
 from airborne.studio.pictures import Pictures, ShownTrial
 from airborne.studio.place import LastView, read_place, write_place
-from airborne.studio.project import Project, read_project
+from airborne.studio.project import VIDEO_ENDINGS, Project, read_project
 from airborne.studio.trial_edits import with_table
 from airborne.studio.writing import FOLDER, Editor, read_if_there, refuse_outer_links
 from airborne.trial.body import BodyTable
@@ -35,6 +35,8 @@ class Session:
         self.pictures, self.editor = Pictures(folder / FOLDER), Editor(folder)
         self.place = read_place(folder)
         self.commands: dict[str, Command] = {}  # that were started here, by what they do
+        if (tracking := find_tracking(folder, path)) is not None:
+            self.commands["track"] = tracking
         self._known: dict[str, tuple[Hashable, Any]] = {}
         self._lock = Lock()
 
@@ -56,9 +58,14 @@ class Session:
 
     @property
     def stamp(self) -> Hashable:
-        """What changes whenever a file of the folder does, or an edit may be undone that could not before."""
-        tables = [path for path in self.folder.iterdir() if path.suffix in (".toml", ".csv", ".json") or path.is_dir()]
-        return tuple(map(file_stamp, sorted(tables))), self.editor.last, self.editor.next
+        """What changes whenever a file of the folder does, or an edit may be undone that could not before.
+
+        A video counts by its name, as it changes all the time while it is copied.
+        """
+        paths = sorted(self.folder.iterdir())
+        tables = [path for path in paths if path.suffix in (".toml", ".csv", ".json") or path.is_dir()]
+        videos = [path.name for path in paths if path.suffix.lower() in VIDEO_ENDINGS]
+        return tuple(map(file_stamp, tables)), tuple(videos), self.editor.last, self.editor.next
 
     def project(self) -> Project:
         """Return the trial as its file has it now."""

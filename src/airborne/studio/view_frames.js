@@ -2,7 +2,7 @@
 const KEPT_FRAMES = 16; // decoded, for all cameras
 const AHEAD = 4; // frames fetched in the direction of travel
 const SIGN_MS = 100; // after which a view says that a frame is on its way
-const PREVIEW_MS = 300; // and shows the key frames before it: sooner, they would only take the time that the frame needs
+const PREVIEW_MS = 150; // and shows the key frames before it, so that one sees where it goes
 const SHRINKS = [4, 2]; // times smaller than the video, as the server has pictures
 const sleep = (ms) => new Promise((wake) => setTimeout(wake, ms));
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from nicegui import ui
@@ -12,28 +11,26 @@ from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, count
 from airborne.evaluation import format_clicked_frames
-from airborne.motion.run_folder import holds_players
-from airborne.run.evaluate import assess, evaluate_agreement
 from airborne.studio.clicks import Clicked
 from airborne.studio.digitising import (
     Repetition,
     add_points,
     clicks_of_frame,
+    count_clicks,
     default_points,
-    joint_paths_text,
     list_repetitions,
     parse_repetition,
     predict_click,
     read_digitising,
     record_text,
     set_frame,
+    without_point,
 )
+from airborne.studio.pages.compare_clicks import ClickComparison
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
-from airborne.studio.project import list_runs
-from airborne.studio.runs import run_rows
 from airborne.studio.session import Session
 from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
@@ -44,7 +41,7 @@ _HELP = (
 )
 _EMPTY = "There are no points to click yet. Name one below, such as one end of the body, and press Add."
 _DRAFT = "points"  # their name among the drafts
-_AFTER = {"point": "the next point", "frame": "the next frame", "stay": "nothing"}
+_AFTER = {"point": "next point", "frame": "next frame", "stay": "nothing"}
 
 
 async def digitise_page(session: Session) -> None:
@@ -107,7 +104,7 @@ class DigitisePanel(PointsPanel):
                 self.list = PointList(self.shown.names, self.choose, empty=_EMPTY)
                 with ui.element("div").classes("card"):
                     self._build_points()
-                    self._build_comparison()
+                    ClickComparison(self.session, self.model, lambda: (self.who, self.table))
         self.show()
 
     def _build_who(self) -> None:
@@ -118,29 +115,18 @@ class DigitisePanel(PointsPanel):
             change = ui.button("Change", on_click=lambda: self.change_who(operator.value or "", number.value))
             change.props("flat dense")
         self.note = ui.label().classes("small")
-        with ui.element("div").classes("row-line"):
+        with ui.element("div").classes("row-line tight"):
             then = ui.select(_AFTER, label="after a click").bind_value(self, "then")
-            then.props("outlined dense options-dense").style("width: 180px")
-            ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
+            then.props("outlined dense options-dense").style("width: 138px")
+            help_on = ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
+            help_on.props("dense")
 
     def _build_points(self) -> None:
-        with ui.element("div").classes("row-line"):
-            name = ui.input("another point").props("dense outlined").style("width: 130px")
+        with ui.element("div").classes("row-line tight"):
+            name = ui.input("new point").props("dense outlined").style("width: 114px")
             ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
+            ui.button("Drop", on_click=self.drop).props("flat dense").tooltip("the chosen point, one of your own")
             ui.button("Remove", on_click=self.remove).props("flat dense").tooltip("the chosen click")
-
-    def _build_comparison(self) -> None:
-        runs = [run for run in list_runs(self.session.folder) if not holds_players(run)]
-        if not runs:
-            ui.label("Once there is a run, the clicks can be compared with it here.").classes("soft small")
-            return
-        with ui.element("div").classes("row-line"):
-            choice = ui.select([run.name for run in runs], label="run", value=runs[0].name)
-            choice.props("outlined dense options-dense").style("width: 110px")
-            ui.button("Compare", on_click=lambda: self.compare(self.session.folder / choice.value)).props("flat dense")
-            agree = ui.button("Agreement", on_click=lambda: self.agree(self.session.folder / choice.value))
-            whom = "these clicks" if self._is_person else "everyone who digitised"
-            agree.props("flat dense").tooltip(f"between the run and {whom}")
 
     async def turn_to(self, frame: int) -> None:
         """Show the clicks of another frame."""
@@ -157,7 +143,7 @@ class DigitisePanel(PointsPanel):
             extra, self.extra = self.extra, self._kept()
             table = self._read()
             cameras = self.shown.names
-            if extra != self.extra and self.chosen not in table.points:
+            if self.chosen not in table.points:
                 self.chosen, self.selected = next(iter(table.points), ""), None
             before, now = (format_clicked_frames(each, cameras) for each in (self.table, table))
             if extra != self.extra or before != now:
@@ -205,7 +191,9 @@ class DigitisePanel(PointsPanel):
         if not name.replace("_", "").replace("-", "").isalnum() or len(name) > 40:
             complain("a point's name is 1 to 40 letters, digits, hyphens and underscores")
             return
-        if name not in self.names:
+        if name in self.names:
+            complain(f"{name} is among the points already; it is chosen now")
+        else:
             with errors_shown():
                 self.session.keep_draft(_DRAFT, [*self.extra, name], f"{name} added to the points")
                 self.extra = self._kept()
@@ -213,42 +201,23 @@ class DigitisePanel(PointsPanel):
         self.clicked = self._of_frame()
         await self.choose(name)
 
-    async def compare(self, run: Path) -> None:
-        """Compare a run with these clicks, into its summary and report too."""
-        found = await work("comparing", lambda: self._compare(run))
-        if found is not None:
-            _show_tables(found)
-
-    def _compare(self, run: Path) -> str:
-        if self._is_person:
-            return assess(run, None, None, self._write_paths(run))["joints"].describe()
-        return assess(run, None, self.session.file(self.file))["digitised"].describe()
-
-    async def agree(self, run: Path) -> None:
-        """Say how well a run agrees with the clicks, and of a thing all people and repetitions with each other."""
-        found = await work("comparing", lambda: self._agree(run))
-        if found is not None:
-            _show_tables(found)
-
-    def _agree(self, run: Path) -> str:
-        if self._is_person:
-            return evaluate_agreement(run, joints=self._write_paths(run)).describe()
-        own = self.session.file(self.file)
-        others = [self.session.folder / each.file for each in list_repetitions(self.session.folder)]
-        others = [path for path in others if path != own]
-        return evaluate_agreement(run, digitised=own, operators=others).describe()
-
-    @property
-    def _is_person(self) -> bool:
-        """Whether landmarks are clicked, which are compared one by one, not as a rigid body's pose."""
-        return self.model is not None and self.model.has_joints
-
-    def _write_paths(self, run: Path) -> Path:
-        """Write where the clicked landmarks are in space, and return the file's path."""
-        name = f"{Path(self.file).stem}_joints.csv"
-        text = joint_paths_text(self.table, self.session.rig(), run_rows(run))
-        self.session.edit(name, text, "paths of the clicked joints")
-        return self.session.file(name)
+    async def drop(self) -> None:
+        """Take the chosen point off the list, unless it is the body's or has clicks."""
+        name, cameras = self.chosen, self.shown.names
+        if not name or name in default_points(self.model):
+            complain(f"{name} is a point of the body, which stays" if name else "choose a point first")
+        elif n_clicks := count_clicks(self.table, name):
+            complain(f"{name} has {count(n_clicks, 'click')}; remove these first, then the point")
+        elif len(self.names) == 1 and len(self.table.index):
+            complain(f"{name} is the only point of {self.file}; add another first")
+        else:
+            with errors_shown():
+                left = without_point(self.table, name)
+                if len(left.index):
+                    self.session.edit(self.file, format_clicked_frames(left, cameras), f"{name} dropped")
+                extra = [each for each in self.extra if each != name]
+                self.session.keep_draft(_DRAFT, extra, f"{name} dropped from the points")
+            await self.reread()
 
     def show(self) -> None:
         """Show marks, curves and lists as they are now."""
@@ -257,7 +226,7 @@ class DigitisePanel(PointsPanel):
         self.view.show_over(marks, items, self.selected)
         self.list.show(self.names, self.chosen, self._off_px)
         n_frames = int(np.isfinite(self.table.px).any(axis=(1, 2, 3)).sum())
-        n_clicks = int(np.isfinite(self.table.px[..., 0]).sum())
+        n_clicks = sum(count_clicks(self.table, name) for name in self.names)
         self.note.set_text(f"frame {self.frame}; {count(n_clicks, 'click')} in {count(n_frames, 'frame')}: {self.file}")
 
     def _marks(self) -> Iterator[Mark]:
@@ -290,10 +259,3 @@ class DigitisePanel(PointsPanel):
 
     def _of_frame(self) -> Clicked:
         return clicks_of_frame(self.table, self.frame, self.shown.names)
-
-
-def _show_tables(text: str) -> None:
-    """Show a comparison's tables."""
-    with ui.dialog(value=True).props("aria-label=comparison") as dialog, ui.card().style("max-width: 90vw"):
-        ui.label(text).style("white-space: pre; overflow: auto; font: 12px ui-monospace, monospace")
-        ui.button("Close", on_click=dialog.close).props("flat")

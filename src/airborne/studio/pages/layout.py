@@ -17,7 +17,7 @@ from airborne.studio.session import Session
 
 _T = TypeVar("_T")
 _SILENT_S = 0.1  # a wait that is not announced: shorter ones are not felt as such
-_LOOK_EVERY_S = 1.0  # for changes by other windows and other programs
+_LOOK_EVERY_S = 0.25  # for changes by this window, by others and by other programs: the rail follows at once
 _BLUE = "#0072b2"  # of buttons: dark enough for white letters
 _GREEN = "#006b3c"  # of good news, likewise
 _STEP_OF = {"camera": "Videos", "calibration": "Cameras", "body": "Body"}  # where each table is written
@@ -30,6 +30,7 @@ _KEYS = {
     "drag": "move the picture, a point, or the body where it is outlined",
     "Shift+drag": "turn the body",
     "0": "whole pictures",
+    "double-click": "one whole picture, where clicks set no point",
     "C": "one camera alone, the next one, all of them",
     "click": "set the chosen point",
     "arrows": "move the chosen point by 0.1 px; with Shift by 1 px",

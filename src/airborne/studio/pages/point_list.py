@@ -13,7 +13,7 @@ from nicegui.elements.label import Label
 from airborne.types import Array, Mask
 
 _NOT_CLICKED, _CLICKED = "–", "•"
-_NARROWEST_PX, _WIDEST_PX, _COLUMNS_PX = 24, 44, 176  # a column: 12.3 fits; cam1 does; all of them, beside the names
+_NARROWEST_PX, _WIDEST_PX, _COLUMNS_PX = 24, 36, 176  # a column: 12.3 fits; cam1 does; all of them, beside the names
 
 
 class PointList:

@@ -1,0 +1,84 @@
+"""Digitised points beside a run: errors, and how well run and people agree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from nicegui import ui
+
+from airborne.body import BodyModel
+from airborne.evaluation import DigitisedPoints
+from airborne.motion.run_folder import holds_players
+from airborne.run.evaluate import assess, evaluate_agreement
+from airborne.studio.digitising import Repetition, joint_paths_text, list_repetitions
+from airborne.studio.pages.layout import work
+from airborne.studio.project import list_runs
+from airborne.studio.runs import run_rows
+from airborne.studio.session import Session
+
+
+class ClickComparison:
+    """One window's buttons that compare one person's clicks with a run."""
+
+    def __init__(
+        self, session: Session, model: BodyModel | None, clicks: Callable[[], tuple[Repetition, DigitisedPoints]]
+    ) -> None:
+        """Lay them out; `clicks` tells whose clicks are compared, and which."""
+        self.session, self.clicks = session, clicks
+        self.is_person = model is not None and model.has_joints  # landmarks are compared one by one, things as poses
+        runs = [run for run in list_runs(session.folder) if not holds_players(run)]
+        if not runs:
+            ui.label("Once there is a run, the clicks can be compared with it here.").classes("soft small")
+            return
+        with ui.element("div").classes("row-line tight"):
+            choice = ui.select([run.name for run in runs], label="run", value=runs[0].name)
+            choice.props("outlined dense options-dense").style("width: 106px")
+            ui.button("Compare", on_click=lambda: self.compare(session.folder / choice.value)).props("flat dense")
+            agree = ui.button("Agreement", on_click=lambda: self.agree(session.folder / choice.value))
+            whom = "these clicks" if self.is_person else "everyone who digitised"
+            agree.props("flat dense").tooltip(f"between the run and {whom}")
+
+    async def compare(self, run: Path) -> None:
+        """Compare a run with these clicks, into its summary and report too."""
+        found = await work("comparing", lambda: self._compare(run))
+        if found is not None:
+            _show_tables(found)
+
+    def _compare(self, run: Path) -> str:
+        if self.is_person:
+            return assess(run, None, None, self._write_paths(run))["joints"].describe()
+        return assess(run, None, self._file)["digitised"].describe()
+
+    async def agree(self, run: Path) -> None:
+        """Say how well a run agrees with the clicks, and of a thing all people and repetitions with each other."""
+        found = await work("comparing", lambda: self._agree(run))
+        if found is not None:
+            _show_tables(found)
+
+    def _agree(self, run: Path) -> str:
+        if self.is_person:
+            return evaluate_agreement(run, joints=self._write_paths(run)).describe()
+        others = [self.session.folder / each.file for each in list_repetitions(self.session.folder)]
+        others = [path for path in others if path != self._file]
+        return evaluate_agreement(run, digitised=self._file, operators=others).describe()
+
+    @property
+    def _file(self) -> Path:
+        who, _ = self.clicks()
+        return self.session.file(who.file)
+
+    def _write_paths(self, run: Path) -> Path:
+        """Write where the clicked landmarks are in space, and return the file's path."""
+        who, table = self.clicks()
+        name = f"{Path(who.file).stem}_joints.csv"
+        text = joint_paths_text(table, self.session.rig(), run_rows(run))
+        self.session.edit(name, text, "paths of the clicked joints")
+        return self.session.file(name)
+
+
+def _show_tables(text: str) -> None:
+    """Show a comparison's tables."""
+    with ui.dialog(value=True).props("aria-label=comparison") as dialog, ui.card().style("max-width: 90vw"):
+        ui.label(text).style("white-space: pre; overflow: auto; font: 12px ui-monospace, monospace")
+        ui.button("Close", on_click=dialog.close).props("flat")
