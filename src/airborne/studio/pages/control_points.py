@@ -12,8 +12,8 @@ from airborne.calibration.sources.court import court_lines
 from airborne.cameras import Rig
 from airborne.cameras.finding import Finding
 from airborne.errors import AirborneError, count
-from airborne.studio.clicks import Clicked, count_clicked, read_clicked
-from airborne.studio.pages.layout import complain, errors_shown, show_findings
+from airborne.studio.clicks import Clicked, count_clicked, read_survey
+from airborne.studio.pages.layout import complain, show_findings
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -37,16 +37,9 @@ class ControlPointsPanel(PointsPanel):
         self.fits: dict[str, tuple[bytes, Calibration | str]] = {}  # camera -> of which clicks, and it
 
     @classmethod
-    async def open(cls, session: Session, shown: ShownTrial, file: str) -> ControlPointsPanel | None:
-        """Build the panel; complains, and returns None, where the table cannot be read."""
-        try:
-            clicked = read_clicked(session.project().file(file))
-            if clicked.world is None:
-                raise AirborneError(f"{file} has no columns x_m, y_m, z_m; expected surveyed points")
-        except AirborneError as error:
-            complain(error)
-            return None
-        panel = cls(session, shown, file, clicked)
+    async def open(cls, session: Session, shown: ShownTrial, file: str) -> ControlPointsPanel:
+        """Build the panel. Raises AirborneError where the table cannot be used."""
+        panel = cls(session, shown, file, read_survey(session.project().file(file)))
         panel.build()
         await panel.solve()
         return panel
@@ -61,13 +54,19 @@ class ControlPointsPanel(PointsPanel):
         """The table of surveyed points."""
         return self._file
 
-    async def reread(self) -> None:
-        """Show what the table holds now: another window, undo or another program may have changed it."""
-        with errors_shown():
-            clicked = read_clicked(self.session.project().file(self.file))
-            if self.text(clicked) != self.text(self.clicked):
-                self.clicked = clicked
-                await self.solve()
+    async def reread(self) -> bool:
+        """Show what the table holds now: another window, undo or another program may have changed it.
+
+        Say whether it can still be used.
+        """
+        try:
+            clicked = read_survey(self.session.project().file(self.file))
+        except AirborneError:
+            return False
+        if self.text(clicked) != self.text(self.clicked):
+            self.clicked = clicked
+            await self.solve()
+        return True
 
     def build(self) -> None:
         """Lay out the pictures and the list of points."""
