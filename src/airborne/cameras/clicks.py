@@ -85,5 +85,5 @@ def _number(cell: str, where: str) -> float:
     except ValueError:
         value = np.inf
     if not np.isfinite(value):
-        raise CalibrationError(f"{where}: '{cell}' is not a number; correct it, or leave it blank where nothing is seen")
+        raise CalibrationError(f"{where}: '{cell}' is not a number; correct it, or leave it blank if unseen")
     return value

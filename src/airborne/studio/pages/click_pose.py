@@ -82,7 +82,7 @@ class ClickPanel(PointsPanel):
                     self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
                     ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
                     ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                    FitButton(self.session, self.hand, lambda: self.frame, self.take_pose)
+                    FitButton(self.session, self.hand, lambda: self.frame, self.take_pose, self.latest.settle)
                     self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
                 self.list = PointList(self.shown.names, self.choose)
         await self.show_frame()

@@ -268,6 +268,11 @@ class Latest:
             result = await in_thread(function, *arguments, says=says) if asked == self._asked else None
         return result if asked == self._asked else None
 
+    async def settle(self) -> None:
+        """Wait until nothing that was asked for goes on."""
+        async with self._lock:
+            pass
+
 
 async def work(what: str, function: Callable[[], _T]) -> _T | None:
     """Do something slow in a thread, saying what; None where it ends in an error, which is shown."""
