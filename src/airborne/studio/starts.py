@@ -37,6 +37,7 @@ _WAYS = (
     "detections",
     "detections_cameras",
 )  # a start has one of them
+_ON_A_LINE_M = 0.01  # points nearer to a line than a click is off determine no turn about it
 _DRAFT = "start"  # its name among the drafts
 
 
@@ -149,6 +150,12 @@ def drafted_pose(model: BodyModel, start: dict[str, Any] | None) -> Pose | None:
 
 def _clicks_text(session: Session, start: dict[str, Any]) -> str | None:
     return read_if_there(session.file(points_name(start["frame"])))
+
+
+def can_be_clicked(model: BodyModel) -> bool:
+    """Say whether clicks of a body's landmarks determine its pose: a thing's must have three that are not on a line."""
+    points = np.array([mark.position_m for mark in model.landmarks])
+    return model.has_joints or int(np.linalg.matrix_rank(points - points.mean(axis=0), tol=_ON_A_LINE_M)) > 1
 
 
 def fit_clicks(model: BodyModel, rig: Rig, clicked: Clicked) -> tuple[Pose | None, str]:
