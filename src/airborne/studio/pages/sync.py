@@ -28,7 +28,7 @@ _WAYS = {"motion": "motion", "flash": "a flash", "sound": "sound", "tracking": "
 
 async def sync_page(session: Session) -> None:
     """Let the user find the offset of each camera from the first one's clock."""
-    async with page_frame(session, "Videos", "Are the cameras synchronised?", _HELP) as changed:
+    async with page_frame(session, "Videos", "Are the cameras synchronised?", _HELP, task="sync") as changed:
         if len(session.project().cameras) < 2:
             ui.label("Choose two cameras or more first, in the step Videos.").classes("warn")
             return
