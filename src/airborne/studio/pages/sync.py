@@ -22,6 +22,7 @@ _HELP = (
     "Step each camera to the same event, a foot that lands or a ball that is hit, and press E. "
     "Several events narrow the offset down: each gives it to within half a frame."
 )
+_MOMENT = "steps the other camera to the moment of the clock's picture, by the offset that the trial has"
 _DRAFT = "events"  # their name among the drafts: the two videos -> pairs of pictures
 _WAYS = {"motion": "motion", "flash": "a flash", "sound": "sound", "tracking": "tracking the body"}
 
@@ -56,6 +57,7 @@ class _Panel:
             choice.props("outlined dense options-dense").style("min-width: 160px")
             ui.button("Same event", on_click=self.add).props("unelevated")
             ui.button("Remove the last event", on_click=self.take_back).props("flat dense")
+            ui.button("Show the same moment", on_click=self.show_moment).props("flat dense").tooltip(_MOMENT)
             self.use = ui.button("Use this offset", on_click=self.write).props("unelevated")
             self.says = ui.label().classes("small")
         with ui.element("div").classes("split"):
@@ -80,7 +82,7 @@ class _Panel:
         self.right.clear()
         with self.right:
             self.labels = [self.labels[0], ui.label().classes("small name")]
-            CameraViews(self.shown, frame=0, camera=other, on_frame=lambda number: self.turn(1, number))
+            self.view = CameraViews(self.shown, frame=0, camera=other, on_frame=lambda number: self.turn(1, number))
         self.show()
 
     def turn(self, side: int, number: int) -> None:
@@ -153,6 +155,17 @@ class _Panel:
         offset_s, sd_s, *_ = fit_line(np.zeros(len(pairs)), np.array(offsets), sds, with_drift=False)
         return offset_s, sd_s
 
+    async def show_moment(self) -> None:
+        """Step the other camera to what it saw when the clock's picture was taken, by the offset that the trial has."""
+        shown = await work("indexing the videos", self.session.shown)  # with the offsets of now
+        if shown is None:
+            return
+        here, there = shown.sources[0], shown.sources[self.other]
+        moment = here.trial_time(self.time(0, self.at[0]))
+        pictures = range(len(self.shown.indexes[self.other]))
+        times = [abs(there.trial_time(self.time(self.other, number)) - moment) for number in pictures]
+        self.view.go(times.index(min(times)))
+
     def time(self, camera: int, number: int) -> Fraction:
         """Return when a camera's picture was taken, since its first."""
         times, unit = self.shown.indexes[camera].times()
@@ -181,6 +194,7 @@ class _Panel:
         trial = self.session.path.name
         self.watch.start("sync", trial, "--by", way, writes=trial, what="offsets found")
 
-    def show_answer(self, command: Command) -> None:
-        """Show what it has found."""
+    async def show_answer(self, command: Command) -> None:
+        """Show what it has found, and the two pictures of one moment by that."""
         self.watch.says.set_text(command.output().strip())
+        await self.show_moment()
