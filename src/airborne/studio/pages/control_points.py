@@ -17,6 +17,7 @@ from airborne.studio.pages.layout import complain, show_findings
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
+from airborne.studio.plan import plan_svg
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras, draw_rays
@@ -77,8 +78,11 @@ class ControlPointsPanel(PointsPanel):
                 self.state = ui.refreshable(self._list_state)
                 with ui.element("div").classes("card"):
                     self.state()
-                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
-                    ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
+                    self.plan = ui.html(sanitize=False)
+                    self.place = ui.label().classes("soft small")
+                    with ui.element("div").classes("row-line"):
+                        ui.button("Remove the click", on_click=self.remove).props("flat dense")
+                        ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
                     self.scene = ui.element("div").style("height: 260px; display: flex")
                     self.scene.set_visibility(False)
                 self.list = PointList(self.shown.names, self.choose)
@@ -118,7 +122,17 @@ class ControlPointsPanel(PointsPanel):
         lines = [item for pane, camera in enumerate(self.shown.names) for item in self._court(pane, camera)]
         self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != CHOSEN_COLOUR), lines, self.selected)
         self.list.show(self.clicked.names, self.chosen, self._off_px, self._findings_of_points())
+        self._show_plan()
         self.state.refresh()
+
+    def _show_plan(self) -> None:
+        """Mark the chosen point among all, from above."""
+        assert self.clicked.world is not None
+        row, points = self.clicked.names.index(self.chosen), self.clicked.world
+        lines = court_lines(dict(zip(self.clicked.names, points, strict=True)))
+        self.plan.set_content(plan_svg(points, row, lines))
+        x, y, z = points[row]
+        self.place.set_text(f"From above: {self.chosen} at x {x:.2f}, y {y:.2f}, z {z:.2f} m")
 
     def _marks(self, pane: int, camera: str) -> list[Mark]:
         marks: list[Mark] = []
