@@ -7,6 +7,7 @@ import pytest
 from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
+from airborne.studio.pages.body import describe_body
 from airborne.studio.project import find_trial, list_measurements, read_project, steps
 from tests.support.places import THROWN_CROSS
 
@@ -72,3 +73,17 @@ def test_measurements_of_a_person_are_found_by_what_is_in_the_files(tmp_path):
 def test_a_path_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(TrialError, match="give a folder of videos"):
         find_trial(tmp_path / "nothing")
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ({}, "No body is chosen yet."),
+        ({"file": "cross.toml"}, "The body in force: cross.toml"),
+        ({"preset": "legs"}, "The body in force: players"),
+        ({"preset": "human18", "stature_m": 1.74, "mass_kg": 70.0}, "The body in force: a person, 1.74 m, 70.0 kg"),
+        ({"measurements": "anna.txt"}, "The body in force: a person as measured in anna.txt"),
+    ],
+)
+def test_the_body_in_force_is_named(table, says):
+    assert describe_body(table) == says

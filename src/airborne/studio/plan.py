@@ -13,9 +13,7 @@ _POINT, _CHOSEN, _LINE = "#5d666f", "#d55e00", "#9aa3ab"
 
 
 def plan_svg(world: Array, chosen: int, lines: Sequence[Array]) -> str:
-    """Draw points (n, 3) [m] and lines (2, 3) [m] from above as SVG, the longer side to the right; row `chosen` stands
-    out.
-    """
+    """Draw points (n, 3) [m] and lines (2, 3) [m] from above, the longer side to the right; row `chosen` stands out."""
     ends = np.array([end for line in lines for end in line]).reshape(-1, 3)
     is_long = bool(np.ptp(world[:, 1]) > np.ptp(world[:, 0]))
     points, ends = _from_above(world, is_long), _from_above(ends, is_long)
@@ -30,12 +28,11 @@ def plan_svg(world: Array, chosen: int, lines: Sequence[Array]) -> str:
     drawn += [f'<circle cx="{u:.1f}" cy="{v:.1f}" r="2" fill="{_POINT}"/>' for u, v in at.tolist()]
     u, v = at[chosen].tolist()
     drawn.append(f'<circle cx="{u:.1f}" cy="{v:.1f}" r="5" fill="{_CHOSEN}"/>')
-    return (
-        f'<svg width="{width}" height="{height}" role="img" aria-label="the points from above">{"".join(drawn)}</svg>'
-    )
+    head = f'<svg width="{width}" height="{height}" role="img" aria-label="the points from above">'
+    return f"{head}{''.join(drawn)}</svg>"
 
 
 def _from_above(points: Array, is_long: bool) -> Array:
-    """Return where points (n, 3) lie in a drawing whose second axis points down: x or, of a long plan, y to the right."""
+    """Return where points (n, 3) lie in a drawing whose second axis points down; of a long plan y is to the right."""
     x, y = points[:, 0], points[:, 1]
     return np.stack([y, x] if is_long else [x, -y], axis=1)

@@ -165,4 +165,4 @@ def fit_clicks(model: BodyModel, rig: Rig, clicked: Clicked) -> tuple[Pose | Non
         first = fit_to_pixels(model, rig, "clicks", names=clicked.names, px=px, weights=np.ones(px.shape[:-1]))
     except AirborneError as error:
         return None, str(error)
-    return first.pose, " ".join(first.notes)
+    return first.pose, " ".join(note.removeprefix("clicks: ") for note in first.notes)

@@ -39,8 +39,8 @@ from airborne.studio.view import Drag, Mark
 
 _NEEDED = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 _HELP = (
-    "Go to the frame where tracking shall start. Choose a landmark and click it in two cameras or more: a click draws, "
-    "in the others, the curve on which it lies, give or take two deviations."
+    "Choose a landmark and click it in two cameras or more: a click draws, in the others, the curve on which it lies, "
+    "give or take two deviations."
 )
 _NEEDED_OF_PERSON = "Both hips and both shoulders are needed."
 _NEEDED_OF_THING = "Three landmarks that are not on one line are needed."
@@ -83,10 +83,11 @@ class ClickPanel(PointsPanel):
                 with ui.element("div").classes("card"):
                     self.note = ui.label().classes("small")
                     self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
-                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
-                    ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                    FitButton(self.session, self.hand, lambda: self.frame, self.take_pose, self.latest.settle)
-                    self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
+                    with ui.element("div").classes("row-line tools"):
+                        ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
+                        ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
+                        FitButton(self.session, self.hand, lambda: self.frame, self.take_pose, self.latest.settle)
+                        self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
                 self.list = PointList(self.shown.names, self.choose)
         await self.show_frame()
         stored = read_pose(self.session, self.model)

@@ -80,7 +80,7 @@ class ControlPointsPanel(PointsPanel):
                     self.state()
                     self.plan = ui.html(sanitize=False)
                     self.place = ui.label().classes("soft small")
-                    with ui.element("div").classes("row-line"):
+                    with ui.element("div").classes("row-line tools"):
                         ui.button("Remove the click", on_click=self.remove).props("flat dense")
                         ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
                     self.scene = ui.element("div").style("height: 260px; display: flex")
@@ -132,7 +132,7 @@ class ControlPointsPanel(PointsPanel):
         lines = court_lines(dict(zip(self.clicked.names, points, strict=True)))
         self.plan.set_content(plan_svg(points, row, lines))
         x, y, z = points[row]
-        self.place.set_text(f"From above: {self.chosen} at x {x:.2f}, y {y:.2f}, z {z:.2f} m")
+        self.place.set_text(f"From above; the point is at x {x:.2f}, y {y:.2f}, z {z:.2f} m")
 
     def _marks(self, pane: int, camera: str) -> list[Mark]:
         marks: list[Mark] = []
@@ -187,8 +187,9 @@ class ControlPointsPanel(PointsPanel):
             else:
                 text, tone = f"{count(n, 'point')} of the {FEWEST_POINTS} that are needed", "warn"
             with ui.element("div"):
-                ui.label(camera).classes("name")
-                ui.label(text).classes(f"{tone} small")
+                with ui.element("div").classes("row-line tools"):
+                    ui.label(camera).classes("name")
+                    ui.label(text).classes(f"{tone} small")
                 show_findings(each.sentence for each in self._findings(camera) if not each.points)
 
     def _findings(self, camera: str) -> tuple[Finding, ...]:
