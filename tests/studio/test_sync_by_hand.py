@@ -69,6 +69,8 @@ def test_two_events_give_the_offset_and_its_deviation(folder):
         page.get_by_role("option", name="a flash").click()
         page.get_by_role("button", name="Find the offsets").click()
         page.get_by_text(re.compile(r"second: offset -\d+")).wait_for(timeout=2 * MINUTE)
+        page.get_by_text("mean brightness, one second of it").wait_for()
+        assert page.locator("svg[aria-label='levels over time'] polyline").count() == 2
         step_to(page, 0, FLASHES["first"])
         page.get_by_text(f"first, the clock: picture {FLASHES['first']},").wait_for()
         page.get_by_role("button", name="Show the same moment").click()

@@ -12,8 +12,10 @@ from airborne.errors import count
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import errors_shown, page_frame, work
+from airborne.studio.pages.points_panel import CAMERA_COLOURS
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
+from airborne.studio.sync_evidence import WAYS, curves_svg, level_curves
 from airborne.studio.trial_edits import with_cameras
 from airborne.studio.view import CameraViews
 from airborne.sync.offsets import fit_line
@@ -73,6 +75,7 @@ class _Panel:
             self.watch = CommandWatch(self.session, "sync", self.show_answer, words="looking for the offsets")
             self.watch.buttons = [find]
             self.watch.says.style("white-space: pre-line")
+        self.evidence = ui.element("div").classes("row-line")
         self.choose(1)
 
     def choose(self, other: int) -> None:
@@ -198,3 +201,20 @@ class _Panel:
         """Show what it has found, and the two pictures of one moment by that."""
         self.watch.says.set_text(command.output().strip())
         await self.show_moment()
+        await self.show_curves(next((way for way in WAYS if f"--by {way}" in command.line), None))
+
+    async def show_curves(self, way: str | None) -> None:
+        """Show what the cameras saw or heard about the moment that tells most, on the clock that was found."""
+        self.evidence.clear()
+        if way is None:
+            return
+        curves = await work("reading the curves", lambda: level_curves(way, self.session.shown().sources))
+        if curves is not None:
+            with self.evidence:
+                ui.html(curves_svg(curves, CAMERA_COLOURS), sanitize=False)
+                with ui.element("div"):
+                    ui.label(f"{WAYS[way]}, one second of it: the curves must rise together").classes("small soft")
+                    for name, colour in zip(self.shown.names, CAMERA_COLOURS, strict=False):
+                        with ui.element("div").classes("row-line small"):
+                            ui.element("span").style(f"width: 22px; height: 3px; background: {colour}")
+                            ui.label(name)
