@@ -15,7 +15,7 @@ from airborne.video import VideoSource
 WAYS = {"flash": "mean brightness", "sound": "loudness"}  # that have curves, and what they show
 _AROUND_S = 0.5  # of the moment at which the first camera's curve rises most
 _STEP_S = 0.002  # between points of loudness
-_WIDE_PX, _HIGH_PX, _RIM_PX = 720, 90, 6
+_WIDE_PX, _HIGH_PX, _RIM_PX = 720, 90, 6  # of the drawing; about the curves
 
 
 def level_curves(way: str, sources: Sequence[VideoSource]) -> list[Array]:
