@@ -32,10 +32,10 @@ def test_camera_without_columns_saw_nothing_and_others_do_not_matter(tmp_path):
     ("old", "new", "said"),
     [
         ("knee_left,,", "knee_left,7,", "point 'knee_left' has only one of right_u and right_v"),
-        ("3,4", "3,x", "point 'hip_left', right_v: 'x' is not a number"),
+        ("3,4", "3,x", r"row 2 \(point 'hip_left'\), column right_v: 'x' is not a number; correct it"),
         ("3,4", "3,inf", "'inf' is not a number"),
-        ("knee_left", "hip_left", "row 'hip_left,,,5,6' needs 5 values and a point of its own"),
-        ("5,6", "5", "row 'knee_left,,,5' needs 5 values"),
+        ("knee_left", "hip_left", "row 3: 'hip_left,,,5,6' needs 5 values and a point of its own"),
+        ("5,6", "5", "row 3: 'knee_left,,,5' needs 5 values"),
         ("point", "joint", "found header joint,right_u"),
         ("right_u", "x_m", "column 'x_m' is not <camera>_u or <camera>_v"),
         (CLICKS, "", "found header nothing and 0 rows"),

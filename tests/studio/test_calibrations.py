@@ -15,6 +15,7 @@ from tests.support.places import THROWN_CROSS
 from tests.support.studio import User, fork_studio, open_page
 
 SIZE = (320, 240)
+SURVEY = "point,x_m,y_m,z_m\nP1,1,2,3\n"
 NAMES = ("left", "right")
 PLACES = ([3.0, -4.0, 1.5], [-4.0, -3.0, 1.2])
 TRIAL = """name = "fall"
@@ -96,4 +97,18 @@ def test_names_of_a_file_are_chosen_in_the_browser(folder):
         assert trial.calibration.file == "theirs.toml" and "# a remark" in (folder / "trial.toml").read_text()
         user.click(page.get_by_label("Undo"))
         page.get_by_text("undone", exact=False).wait_for()
-    assert "calibration" not in read_toml(folder / "trial.toml")
+        page.get_by_text("focal length 300 px", exact=False).first.wait_for(state="detached")
+        assert "calibration" not in read_toml(folder / "trial.toml")
+        user.click(page.get_by_label("calibration file"))  # the choice was taken back too: it can be made again
+        user.click(page.get_by_role("option", name="own.toml"))
+        page.get_by_text("focal length 300 px", exact=False).first.wait_for()
+        (folder / "points.csv").write_text(SURVEY.replace("2", "two"))
+        page.get_by_text("points.csv, row 2 (point 'P1'), column y_m: 'two' is not a number").wait_for()
+        (folder / "points.csv").write_text(SURVEY)
+        page.get_by_text("points.csv, row 2").wait_for(state="detached")
+        user.click(page.get_by_label("surveyed points"))
+        user.click(page.get_by_role("option", name="points.csv"))
+        page.get_by_text("0 points of the 6 that are needed").first.wait_for()
+        (folder / "points.csv").write_text(SURVEY.replace("2", "two"))  # a table that is in use
+        page.get_by_text("points.csv, row 2 (point 'P1'), column y_m: 'two' is not a number").first.wait_for()
+    assert read_toml(folder / "trial.toml")["calibration"] == {"control_points": "points.csv"}

@@ -1,6 +1,7 @@
 """A person's first pose by clicks in a real browser: landmarks, a pixel off, become the pose that the command finds."""
 
 import shutil
+import time
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import SAMPLED, Pose, human18
 from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.run.first_pose import find_first_pose
+from airborne.studio.fitting import Fit
+from airborne.studio.pages import fit_pose
 from airborne.studio.starts import standing_pose
 from airborne.trial.file import read_trial
 from tests.support.clips import write_clip
@@ -26,6 +29,12 @@ TRUNK = """pane => {
         const share = axis ? 0.33 : 0.5; // the chest of a body that stands
         return (1 - share) * Math.min(...all) + share * Math.max(...all);
     });
+}"""
+MIDDLE = """() => {
+    const { view } = document.querySelector("canvas.view");
+    const points = view.nowItems().filter((item) => item.grab && item.pane === 0).flatMap((item) => item.points);
+    const mean = (axis) => Math.round(points.reduce((sum, point) => sum + point[axis], 0) / points.length);
+    return points.length ? [mean(0), mean(1)] : null;
 }"""
 GIZMO = """() => {
     const scene = getElement(Number(document.querySelector(".nicegui-scene").id.slice(1)));
@@ -141,19 +150,24 @@ def use_pose(page, folder, before):
 
 def middle(page):
     """Return where the middle of the outline is in the first picture, rounded [px]; None without one."""
-    script = """() => {
-        const { view } = document.querySelector("canvas.view");
-        const points = view.nowItems().filter((item) => item.grab && item.pane === 0).flatMap((item) => item.points);
-        const mean = (axis) => Math.round(points.reduce((sum, point) => sum + point[axis], 0) / points.length);
-        return points.length ? [mean(0), mean(1)] : null;
-    }"""
-    return page.evaluate(script)
+    return page.evaluate(MIDDLE)
+
+
+def fit_slowly():
+    """Let a fit take a second, in which the user may do something else, and lift the body."""
+
+    def fit(session, model, frame, pose):
+        time.sleep(1)
+        return Fit(pose.move(np.array([0, 0, MOVED_M]), np.zeros(3)), True, np.full(3, 0.003), ())
+
+    fit_pose.fit_to_frame = fit
 
 
 def test_a_pose_set_by_hand_waits_in_its_frame_for_whoever_turns_away_reloads_or_undoes(folder, tmp_path):
     folder = shutil.copytree(folder, tmp_path / "person", ignore=shutil.ignore_patterns(".airborne", "start_*"))
     (folder / "trial.toml").write_text(TRIAL)
-    with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+    studio = fork_studio(folder, before=fit_slowly)
+    with studio as address, open_page(address.replace("/?", "/start?")) as page:
         wait_for_frame(page, 0)
         page.get_by_text("No landmark is clicked in frame 0 yet.").wait_for()
         page.get_by_role("button", name="Place it by hand").click()
@@ -182,6 +196,18 @@ def test_a_pose_set_by_hand_waits_in_its_frame_for_whoever_turns_away_reloads_or
                 break
             page.wait_for_timeout(100)
         np.testing.assert_allclose(middle(page), placed, atol=1)
+        page.get_by_role("button", name="Fit it to the pictures").click()
+        page.get_by_text("fitting the body …").wait_for()
+        page.locator("canvas.view").press(".")  # the fit ends while another frame is in view
+        page.get_by_text("Frame 0 is fitted.", exact=False).first.wait_for()
+        page.get_by_text("No landmark is clicked in frame 1 yet.").wait_for()
+        page.locator("canvas.view").press(",")
+        page.get_by_text("made here last").wait_for()
+        page.wait_for_function("document.querySelector('canvas.view').view.nowItems().length >= 2")
+        assert middle(page)[1] < placed[1] - 20  # the fit of this test lifts the body
+        page.locator("canvas.view").press("Control+z")
+        page.get_by_text("undone: pose fitted to the pictures (draft.json)").wait_for()
+        page.wait_for_function(f"document.querySelector('canvas.view') && ({MIDDLE})()[1] > {placed[1] - 5}")
         page.locator("canvas.view").press("Control+z")
         page.get_by_text("No landmark is clicked in frame 0 yet.").wait_for()
 

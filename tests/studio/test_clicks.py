@@ -41,7 +41,26 @@ def test_surveys_are_told_from_other_tables(tmp_path):
     (tmp_path / "survey.csv").write_text(SURVEY)
     (tmp_path / "clicks.csv").write_text("point,a_u,a_v\nP1,1,2\n")
     (tmp_path / "truth.csv").write_text("field,time_s\n0,0.0\n")
-    assert list_surveys(tmp_path) == ["survey.csv"]
+    found = list_surveys(tmp_path)
+    assert (found.usable, found.refused) == (["survey.csv"], {})
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (SURVEY.replace("2.0", "two"), "survey.csv, row 3 (point 'P2'), column y_m: 'two' is not a number; correct it"),
+        (SURVEY.replace("1.25", ""), "survey.csv, point 'P1', column y_m: nothing stands there; expected metres"),
+        ("point,x_m,y_m,z_m,a_u,a_v\nP1,0,0,0,3,\n", "survey.csv, point 'P1': only one of a_u and a_v is there"),
+        (SURVEY.replace(",", ";"), "survey.csv: found header point;x_m;y_m;z_m"),
+        (SURVEY.replace("_m", ""), "survey.csv has no columns x_m, y_m, z_m; expected surveyed points"),
+        ("point,x_m,y_m,z_m\n", "survey.csv: found header point,x_m,y_m,z_m and 0 rows"),
+    ],
+)
+def test_a_survey_with_a_mistake_is_listed_and_says_where(tmp_path, text, says):
+    (tmp_path / "survey.csv").write_text(text)
+    found = list_surveys(tmp_path)
+    assert found.usable == [] and list(found.refused) == ["survey.csv"]
+    assert found.refused["survey.csv"].startswith(says)
 
 
 def test_the_deviation_of_a_length_is_that_of_lengths_from_many_clicks():

@@ -1,11 +1,13 @@
 """A pose that was placed beside the body goes to where the pictures show it."""
 
 import csv
+import re
 import shutil
 
 import numpy as np
 
-from airborne.studio.fitting import fit_to_frame
+from airborne.studio.disagreement import EdgeShift
+from airborne.studio.fitting import Fit, describe_fit, fit_to_frame
 from airborne.studio.session import Session
 from airborne.studio.starts import read_pose
 from tests.support.places import THROWN_CROSS
@@ -22,7 +24,21 @@ def test_poses_beside_the_body_are_fitted_to_the_pictures_of_their_frame(tmp_pat
         row = next(row for row in csv.DictReader(file) if int(row["field"]) == frame)
     true_m = [float(row[f"{axis}_m"]) for axis in "xyz"]
     for pose in (start, start.move(np.array([0.02, -0.015, 0.01]), np.array([0.0, 0.03, 0.0]))):
-        fitted = fit_to_frame(session, model, frame, pose)
-        assert np.linalg.norm(fitted.world_from_root.translation - true_m) < NEAR_M
+        fit = fit_to_frame(session, model, frame, pose)
+        assert np.linalg.norm(fit.pose.world_from_root.translation - true_m) < NEAR_M
+        assert np.all(np.abs(fit.pose.world_from_root.translation - true_m) < 4 * fit.place_sd_m)
+        says = r"Edges lie 0\.\d ± 0\.\d px off the outline on average; 3 of 3 cameras agree\. Place ± \d"
+        assert re.match(says, describe_fit(fit))
         assert np.linalg.norm(pose.world_from_root.translation - true_m) > NEAR_M
     assert (folder / "trial.toml").read_bytes() == before
+
+
+def test_a_doubtful_fit_says_why_and_what_to_do():
+    shifts = [EdgeShift(name, np.array([u, 0.0]), 0.5, u > 1) for name, u in (("a", 0.5), ("b", 7.5))]
+    off = Fit(None, True, np.full(3, 0.004), shifts)
+    assert describe_fit(off) == (
+        "Doubtful: off in b 7.5 px. Edges lie 4.0 ± 0.4 px off the outline on average; 1 of 2 cameras agree. "
+        "Place ± 4, 4, 4 mm (sd of x, y, z). Drag the body onto those pictures and fit again."
+    )
+    assert describe_fit(Fit(None, False, np.full(3, 0.004), shifts[:1])).endswith("before you use it.")
+    assert describe_fit(Fit(None, True, np.full(3, 0.004), [])).startswith("No camera shows enough of the body")

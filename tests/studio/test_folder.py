@@ -46,7 +46,7 @@ colour = "sample"
 """
 LISTS = {
     "calibration": lambda folder: list_calibrations(folder, {"cam1"}).usable,
-    "surveys": list_surveys,
+    "surveys": lambda folder: list_surveys(folder).usable,
     "bodies": lambda folder: [name for name in list_bodies(folder) if name != "hull.toml"],
     "bodies with a mesh": lambda folder: [name for name in list_bodies(folder) if name == "hull.toml"],
     "measurements": list_measurements,

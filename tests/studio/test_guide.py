@@ -14,6 +14,7 @@ def test_the_walk_goes_from_step_to_step(tmp_path):
     (tmp_path / "trial.toml").write_text('[[camera]]\nname = "a"\nvideo = "a.mp4"\n')
     task, following = next_task(read_project(*find_trial(tmp_path)), "Videos")
     assert "Use these cameras" in task
+    assert "Use this thing" in next_task(project, "Body", "thing")[0] != next_task(project, "Body")[0]
     assert following.name == "Cameras"
 
 

@@ -8,6 +8,7 @@ from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
 from airborne.io.folder_lock import sole_writer
+from airborne.studio.pages.body import describe_body
 from airborne.studio.project import find_trial, list_measurements, list_runs, read_project, steps
 from airborne.studio.run_names import check_run_name, next_run_name
 from airborne.studio.session import Session
@@ -51,7 +52,7 @@ def test_what_is_missing_is_said(tmp_path):
 def test_a_run_is_ready_once_it_is_finished(tmp_path):
     folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
     (run := folder / "results").mkdir()
-    (run / "motion.csv").touch()
+    (run / "motion.csv").write_text("frame,time_s\n0,0.0\n")
 
     def track_step():
         step = next(step for step in steps(read_project(folder, folder / "trial.toml")) if step.name == "Track")
@@ -141,3 +142,17 @@ def test_a_run_is_no_file_and_the_next_one_has_a_free_name(tmp_path):
         "results_3",
         "throw_b_2",
     ]
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ({}, "No body is chosen yet."),
+        ({"file": "cross.toml"}, "The body in force: cross.toml"),
+        ({"preset": "legs"}, "The body in force: players"),
+        ({"preset": "human18", "stature_m": 1.74, "mass_kg": 70.0}, "The body in force: a person, 1.74 m, 70.0 kg"),
+        ({"measurements": "anna.txt"}, "The body in force: a person as measured in anna.txt"),
+    ],
+)
+def test_the_body_in_force_is_named(table, says):
+    assert describe_body(table) == says

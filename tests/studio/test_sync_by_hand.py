@@ -69,6 +69,12 @@ def test_two_events_give_the_offset_and_its_deviation(folder):
         page.get_by_role("option", name="a flash").click()
         page.get_by_role("button", name="Find the offsets").click()
         page.get_by_text(re.compile(r"second: offset -\d+")).wait_for(timeout=2 * MINUTE)
+        page.get_by_text("mean brightness, one second of it").wait_for()
+        assert page.locator("svg[aria-label='levels over time'] polyline").count() == 2
+        step_to(page, 0, FLASHES["first"])
+        page.get_by_text(f"first, the clock: picture {FLASHES['first']},").wait_for()
+        page.get_by_role("button", name="Show the same moment").click()
+        page.get_by_text(f"second: picture {FLASHES['second']},").wait_for()
     period_s = (0.04**2 + 0.02**2) ** 0.5
     assert (by_hand["name"], by_hand["offset_s"]) == ("second", -0.2)
     assert by_hand["offset_sd_s"] == pytest.approx(period_s / 12**0.5 / 2**0.5, rel=1e-3)

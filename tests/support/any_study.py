@@ -75,7 +75,7 @@ def studio(folder):
     def click():
         known = read_clicked(points)
         clicked = known.click(known.names[0], "cam1", (1.0, 2.0))
-        return clicked.text(("cam1", "cam2")), count_clicked(clicked, "cam1"), list_surveys(cross)
+        return clicked.text(("cam1", "cam2")), count_clicked(clicked, "cam1"), list_surveys(cross).usable
 
     yield "studio's clicks", points, click
     yield "studio's list of bodies", cross / "cross.toml", partial(list_bodies, cross)

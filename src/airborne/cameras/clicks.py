@@ -54,8 +54,7 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
 
     `expected` says in errors what the table should be. Raises CalibrationError, naming the row and column.
     """
-    lines = [row for _, row in read_csv(path, expected, CalibrationError)]
-    header, *rows = lines or [[]]
+    (_, header), *rows = read_csv(path, expected, CalibrationError) or [(0, [])]
     if key not in header or len(set(header)) < len(header) or not rows:
         header_text = ",".join(header)[:80] or "nothing"
         raise CalibrationError(f"{path.name}: found header {header_text} and {len(rows)} rows; {expected}, each once")
@@ -63,15 +62,18 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
     columns = tuple(header[:key_column] + header[key_column + 1 :])
     names: list[str] = []
     values = np.full((len(rows), len(columns)), np.nan)
-    for number, row in enumerate(rows):
+    for number, (line, row) in enumerate(rows):
         if len(row) != len(header) or not row[key_column] or row[key_column] in names:
             raise CalibrationError(
-                f"{path.name}: row '{','.join(row)[:60]}' needs {len(header)} values and a {key} of its own; {expected}"
+                f"{path.name}, row {line}: '{','.join(row)[:60]}' needs {len(header)} values and a {key} of its own; "
+                f"{expected}"
             )
         names.append(row[key_column])
         cells = row[:key_column] + row[key_column + 1 :]
-        where = f"{path.name}, {key} '{row[key_column]}'"
-        values[number] = [_number(cell, f"{where}, {column}") for cell, column in zip(cells, columns, strict=True)]
+        where = f"{path.name}, row {line} ({key} '{row[key_column]}')"
+        values[number] = [
+            _number(cell, f"{where}, column {column}") for cell, column in zip(cells, columns, strict=True)
+        ]
     return tuple(names), columns, values
 
 
@@ -83,5 +85,5 @@ def _number(cell: str, where: str) -> float:
     except ValueError:
         value = np.inf
     if not np.isfinite(value):
-        raise CalibrationError(f"{where}: '{cell}' is not a number; leave it blank where nothing is seen")
+        raise CalibrationError(f"{where}: '{cell}' is not a number; correct it, or leave it blank if unseen")
     return value

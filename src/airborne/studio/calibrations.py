@@ -13,7 +13,7 @@ from airborne.cameras import read_rig
 from airborne.cameras.formats.openpose import number_at_end
 from airborne.errors import AirborneError, count
 from airborne.studio.calibrating import SOURCES
-from airborne.studio.clicks import read_clicked
+from airborne.studio.clicks import list_surveys, read_clicked
 from airborne.studio.digitising import list_repetitions
 from airborne.studio.folder import files_inside, readable_files
 
@@ -39,7 +39,7 @@ class Calibrations:
 def list_calibrations(folder: Path, wanted: set[str]) -> Calibrations:
     """Look through the files of a folder for cameras of these names; what is known to be another thing is left out."""
     usable, renamed, refused = [], {}, {}
-    others = {SOURCES, *(each.file for each in list_repetitions(folder))}
+    others = {SOURCES, *(each.file for each in list_repetitions(folder)), *list_surveys(folder).refused}
     for path in files_inside(folder, *ENDINGS):
         try:
             names = read_rig(path).names

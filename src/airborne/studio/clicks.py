@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,11 +12,13 @@ import numpy as np
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras import Rig
 from airborne.cameras.clicks import read_named_numbers
-from airborne.studio.folder import readable_files
+from airborne.errors import CalibrationError
+from airborne.studio.folder import files_inside
 from airborne.types import Array
 
 _STEP_M = 1e-4  # of differences
 _WORLD = ("x_m", "y_m", "z_m")
+_WORDS, _LONGEST_HEAD = re.compile(r"\w+"), 100_000  # of a table's first line [bytes]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +74,25 @@ def read_clicked(path: Path) -> Clicked:
     return Clicked(names, world, px)
 
 
+def read_survey(path: Path) -> Clicked:
+    """Read a table of surveyed points, clicked or not. Raises CalibrationError where one has no position."""
+    clicked = read_clicked(path)
+    if clicked.world is None:
+        raise CalibrationError(f"{path.name} has no columns {', '.join(_WORLD)}; expected surveyed points")
+    for row, axis in np.argwhere(np.isnan(clicked.world))[:1]:
+        raise CalibrationError(
+            f"{path.name}, point '{clicked.names[row]}', column {_WORLD[axis]}: nothing stands there; expected metres: "
+            "give it, or remove the point"
+        )
+    for camera, px in clicked.px.items():
+        for row in np.flatnonzero(np.isnan(px).sum(axis=1) == 1)[:1]:
+            raise CalibrationError(
+                f"{path.name}, point '{clicked.names[row]}': only one of {camera}_u and {camera}_v is there; "
+                "give both, or leave both blank"
+            )
+    return clicked
+
+
 def count_clicked(clicked: Clicked, camera: str) -> int:
     """Return how many points are clicked in a camera."""
     return int(np.isfinite(clicked.px[camera][:, 0]).sum()) if camera in clicked.px else 0
@@ -95,9 +117,36 @@ def _covariance(rig: Rig, px: Array, point: Array, sd_px: float) -> Array:
     return sd_px**2 * np.linalg.inv(J.T @ J)
 
 
-def list_surveys(folder: Path) -> list[str]:
-    """List the tables of a folder that hold positions of named points."""
-    return [name for name, table in readable_files(folder, read_clicked, ".csv").items() if table.world is not None]
+@dataclass(frozen=True, slots=True)
+class Surveys:
+    """The tables of a folder that hold positions of named points, or are meant to."""
+
+    usable: Sequence[str]
+    refused: Mapping[str, str]  # why those with its columns cannot be used
+
+
+def list_surveys(folder: Path) -> Surveys:
+    """Look through a folder for tables of surveyed points; what has none of their columns is another thing."""
+    usable, refused = [], {}
+    for path in files_inside(folder, ".csv"):
+        if not _is_meant_as_survey(path):
+            continue
+        try:
+            read_survey(path)
+            usable.append(path.name)
+        except CalibrationError as error:
+            refused[path.name] = str(error).replace(str(path), path.name)
+    return Surveys(usable, refused)
+
+
+def _is_meant_as_survey(path: Path) -> bool:
+    """Say whether a table's first line names points and coordinates, rightly separated or not."""
+    try:
+        with path.open("rb") as file:
+            words = set(_WORDS.findall(file.readline(_LONGEST_HEAD).decode(errors="replace").lower()))
+    except OSError:
+        return False
+    return "point" in words and any(axis in words or axis[0] in words for axis in _WORLD)
 
 
 def _heads(cameras: Sequence[str]) -> list[str]:

@@ -8,7 +8,7 @@ own error.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +16,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from airborne.body import BodyModel, Pose
+from airborne.cameras import Camera
 from airborne.studio.outlines import outline_items
 from airborne.studio.pictures import Pictures, ShownTrial
 from airborne.studio.runs import run_body, run_rig, run_rows
@@ -54,8 +56,19 @@ def look_for_disagreement(run: Path, frame: int, shown: ShownTrial, pictures: Pi
     row = int(np.searchsorted(rows.index, frame))
     frames = [int(each) for each in rows.index[max(0, row - _AROUND) : row + _AROUND + 1]]
     poses = {each: rows.pose(each) for each in frames if each < len(shown.clock)}
+    return describe_shifts(edge_shifts(model, poses, run_rig(run).select(shown.names).cameras, shown, pictures))
+
+
+def edge_shifts(
+    model: BodyModel,
+    poses: Mapping[int, Pose | None],
+    cameras: Sequence[Camera],
+    shown: ShownTrial,
+    pictures: Pictures,
+) -> list[EdgeShift]:
+    """Measure a body's poses, by frame, in the pictures of cameras; those that show too little of it are left out."""
     shifts = []
-    for pane, camera in enumerate(run_rig(run).select(shown.names).cameras):
+    for pane, camera in enumerate(cameras):
         seen = []
         for each, pose in poses.items():
             number = int(shown.clock.images[each, pane])
@@ -64,7 +77,7 @@ def look_for_disagreement(run: Path, frame: int, shown: ShownTrial, pictures: Pi
                 items = outline_items(model.with_pose(pose), (camera,), "")
                 seen.append((image, [np.array(item["points"]) for item in items]))
         shifts.append(edge_shift(camera.name, seen))
-    return describe_shifts([each for each in shifts if each is not None])
+    return [each for each in shifts if each is not None]
 
 
 def edge_shift(camera: str, seen: Sequence[tuple[Image, Sequence[Array]]]) -> EdgeShift | None:

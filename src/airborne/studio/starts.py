@@ -37,6 +37,7 @@ _WAYS = (
     "detections",
     "detections_cameras",
 )  # a start has one of them
+_ON_A_LINE_M = 0.01  # points nearer to a line than a click is off determine no turn about it
 _DRAFT = "start"  # its name among the drafts
 
 
@@ -151,6 +152,12 @@ def _clicks_text(session: Session, start: dict[str, Any]) -> str | None:
     return read_if_there(session.file(points_name(start["frame"])))
 
 
+def can_be_clicked(model: BodyModel) -> bool:
+    """Say whether clicks of a body's landmarks determine its pose: a thing's must have three that are not on a line."""
+    points = np.array([mark.position_m for mark in model.landmarks])
+    return model.has_joints or int(np.linalg.matrix_rank(points - points.mean(axis=0), tol=_ON_A_LINE_M)) > 1
+
+
 def fit_clicks(model: BodyModel, rig: Rig, clicked: Clicked) -> tuple[Pose | None, str]:
     """Fit a body to clicked landmarks: its pose, None where they do not determine it, and what there is to say."""
     px = np.stack([np.stack([clicked.at(name, camera) for camera in rig.names]) for name in clicked.names])
@@ -158,4 +165,4 @@ def fit_clicks(model: BodyModel, rig: Rig, clicked: Clicked) -> tuple[Pose | Non
         first = fit_to_pixels(model, rig, "clicks", names=clicked.names, px=px, weights=np.ones(px.shape[:-1]))
     except AirborneError as error:
         return None, str(error)
-    return first.pose, " ".join(first.notes)
+    return first.pose, " ".join(note.removeprefix("clicks: ") for note in first.notes)

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Awaitable, Callable, Hashable, Mapping
+from typing import Any, TypeAlias
 
 from nicegui import ui
 
-from airborne.body import BodyModel
+from airborne.body import BodyModel, Pose
 from airborne.errors import AirborneError, count
 from airborne.io.text import parse_editable_toml
+from airborne.run.first_pose import find_first_pose
 from airborne.studio.folder import outer_files
+from airborne.studio.outlines import outline_items
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_outer_links, page_frame
 from airborne.studio.project import BODY_ENDING, MEASURED_ENDINGS, list_bodies, list_measurements
 from airborne.studio.session import Session
-from airborne.studio.stage import draw_body
+from airborne.studio.stage import draw_body, reach_of
+from airborne.studio.starts import POSE_COLOUR
 from airborne.studio.trial_edits import with_table
+from airborne.studio.view import CameraViews
 from airborne.trial.body import BodyTable
 from airborne.trial.settings import PLAYERS_METHODS
 
+Use: TypeAlias = Callable[[dict[str, Any]], Awaitable[None]]  # takes the table [body] to write
+_SEEN_PX = 320  # high: the body in 3D and over the pictures
 _KEYS = ("file", "preset", "stature_m", "mass_kg", "measurements")
 _STATURE_M, _MASS_KG = (0.5, 2.6), (10.0, 300.0)  # that are taken for a person's
 
@@ -33,24 +40,35 @@ async def body_page(session: Session) -> None:
         bodies = await in_thread(list_bodies, session.folder, says="reading the bodies")
         measured = await in_thread(list_measurements, session.folder, says="reading the measurements")
         name_outer_links(outer_files(session.folder, BODY_ENDING, *MEASURED_ENDINGS))
-        with ui.element("div").classes("row-line").style("align-items: flex-start"):
-            if bodies:
-                _thing_card(session, bodies, table)
-            _person_card(session, table)
-            _measurements_card(session, measured, table)
-            _players_card(session)
-            scene = ui.refreshable(_show_body)
-            await scene(session)
+        in_force = ui.refreshable(lambda: ui.label(describe_body(session.project().table("body"))).classes("name"))
+        in_force()
+        seen = ui.refreshable(_show_body)
+        shown_of: list[Hashable] = []
 
         async def show_anew() -> None:
-            await scene.refresh()
+            tables = repr([session.project().table(name) for name in ("body", "calibration", "start")])
+            if shown_of != [tables]:
+                shown_of[:] = [tables]
+                in_force.refresh()
+                await seen.refresh()
 
-        changed.append(show_anew)
+        async def use(values: dict[str, Any]) -> None:
+            save_body(session, values)
+            await show_anew()
+
+        with ui.element("div").classes("row-line").style("align-items: flex-start"):
+            if bodies:
+                _thing_card(bodies, table, use)
+            _person_card(table, use)
+            _measurements_card(measured, table, use)
+            _players_card(use)
         with ui.element("div").classes("row-line"):
             if session.project().cameras:
                 _link("/thing", "Describe a thing made of solids")
             if session.project().table("calibration"):
                 _link("/ruler", "Measure a length in the pictures")
+        await seen(session)
+        changed.append(show_anew)
 
 
 def _link(address: str, text: str) -> None:
@@ -58,8 +76,8 @@ def _link(address: str, text: str) -> None:
         ui.label(text)
 
 
-def _thing_card(session: Session, bodies: dict[str, BodyModel], table: dict[str, Any]) -> None:
-    with ui.element("div").classes("card").style("width: 360px"):
+def _thing_card(bodies: dict[str, BodyModel], table: dict[str, Any], use: Use) -> None:
+    with _card():
         ui.label("A body file").classes("name")
         present = table.get("file")
         choice = ui.select(
@@ -67,57 +85,101 @@ def _thing_card(session: Session, bodies: dict[str, BodyModel], table: dict[str,
         ).props("outlined dense options-dense")
         says = ui.label().classes("soft small")
         says.bind_text_from(choice, "value", lambda name: _describe(bodies[name]))
-        ui.button("Use this body", on_click=lambda: save_body(session, {"file": choice.value})).props("unelevated")
+        ui.button("Use this body", on_click=lambda: use({"file": choice.value})).props("unelevated")
 
 
-def _person_card(session: Session, table: dict[str, Any]) -> None:
-    with ui.element("div").classes("card").style("width: 360px"):
+def _person_card(table: dict[str, Any], use: Use) -> None:
+    with _card():
         ui.label("A person").classes("name")
         stature = ui.number("stature [m]", value=table.get("stature_m", 1.75), step=0.01, format="%.2f")
         mass = ui.number("mass [kg]", value=table.get("mass_kg", 70.0), step=0.5, format="%.1f")
         for field in (stature, mass):
             field.props("outlined dense")
 
-        def save() -> None:
+        async def save() -> None:
             stature_m, mass_kg = float(stature.value or 0), float(mass.value or 0)
             if not (_STATURE_M[0] <= stature_m <= _STATURE_M[1] and _MASS_KG[0] <= mass_kg <= _MASS_KG[1]):
                 complain("give a stature in metres, such as 1.75, and a mass in kilograms, such as 70")
                 return
-            save_body(session, {"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
+            await use({"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
 
         ui.button("Use this person", on_click=save).props("unelevated")
 
 
-def _measurements_card(session: Session, files: list[str], table: dict[str, Any]) -> None:
+def _measurements_card(files: list[str], table: dict[str, Any], use: Use) -> None:
     if not files:
         return
-    with ui.element("div").classes("card").style("width: 360px"):
+    with _card():
         ui.label("A measured person").classes("name")
         present = table.get("measurements")
         choice = ui.select(files, label="Yeadon's measurements", value=present if present in files else files[0])
         choice.props("outlined dense options-dense")
-        ui.button("Use these measurements", on_click=lambda: save_body(session, {"measurements": choice.value})).props(
-            "unelevated"
-        )
+        button = ui.button("Use these measurements", on_click=lambda: use({"measurements": choice.value}))
+        button.props("unelevated")
 
 
 async def _show_body(session: Session) -> None:
-    """Show the trial's body from all sides; players have none."""
+    """Show the trial's body from all sides, and over the pictures of the first pose; players have none."""
+
+    def read() -> BodyModel:
+        model = session.project().model()
+        reach_of(model)  # computes its surface, here and not where windows wait
+        return model
+
     try:
-        model = await in_thread(session.project().model, says="reading the body")
+        model = await in_thread(read, says="reading the body")
     except AirborneError:
         return
     address = f"/body/mesh/{{part}}?{hash(repr(session.project().table('body')))}"  # another body's parts are others
-    with ui.element("div").style("display: flex; width: 360px; height: 320px"):
-        draw_body(model, address)
+    with ui.element("div").style(f"display: flex; gap: 12px; height: {_SEEN_PX}px; flex: none"):
+        with ui.element("div").style("display: flex; width: 320px"):
+            draw_body(model, address)
+        placed = await in_thread(_place, session, model, says="placing the body")
+        if placed is not None:
+            frame, pose = placed
+            shown = session.shown()
+            items = outline_items(model.with_pose(pose), session.rig().select(shown.names).cameras, POSE_COLOUR)
+            with ui.element("div").style("display: flex; flex-direction: column; flex: 1; min-width: 0"):
+                view = CameraViews(shown, frame=frame, on_frame=lambda at: view.show_over((), items * (at == frame)))
+                view.show_over((), items)
 
 
-def _players_card(session: Session) -> None:
-    with ui.element("div").classes("card").style("width: 360px"):
+def _place(session: Session, model: BodyModel) -> tuple[int, Pose] | None:
+    """Return the frame and the first pose of the trial; None where it has none, or none yet."""
+    try:
+        trial, rig = session.project().trial(), session.rig()
+        session.shown()
+        if trial.start.find or trial.start.detections is not None:
+            return None
+        return trial.start.frame, find_first_pose(trial, model, rig, None).pose
+    except AirborneError:
+        return None
+
+
+def describe_body(table: Mapping[str, Any]) -> str:
+    """Say which body a trial has, as its table [body] gives it."""
+    preset, file, measured = (table.get(key) for key in ("preset", "file", "measurements"))
+    if file:
+        return f"The body in force: {file}"
+    if measured:
+        return f"The body in force: a person as measured in {measured}"
+    if preset == "legs":
+        return "The body in force: players"
+    if preset:
+        return f"The body in force: a person, {table.get('stature_m', '?')} m, {table.get('mass_kg', '?')} kg"
+    return "No body is chosen yet."
+
+
+def _card() -> ui.element:
+    return ui.element("div").classes("card").style("width: 320px")
+
+
+def _players_card(use: Use) -> None:
+    with _card():
         ui.label("Players").classes("name")
         text = "Hips, knees and feet of any number of players, such as blockers at the net."
         ui.label(text).classes("soft small")
-        ui.button("Use players", on_click=lambda: save_body(session, {"preset": "legs"})).props("unelevated")
+        ui.button("Use players", on_click=lambda: use({"preset": "legs"})).props("unelevated")
 
 
 def _describe(model: BodyModel) -> str:

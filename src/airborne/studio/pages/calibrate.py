@@ -51,7 +51,7 @@ class CalibratePanel:
 
     def __init__(self, session: Session, shown: ShownTrial) -> None:
         """Begin with what the folder holds."""
-        self.session, self.shown, self.is_new = session, shown, False
+        self.session, self.shown = session, shown
         self.videos = {name: guess_video(session.project(), name) for name in shown.names}
 
     def build(self) -> None:
@@ -84,7 +84,6 @@ class CalibratePanel:
             self.results = ui.refreshable(self._show_results)
             self.results()
             ui.button("Close", on_click=dialog.close).props("flat")
-        dialog.on("hide", lambda: ui.navigate.reload() if self.is_new else None)
         ui.button("With a board or a wand", on_click=dialog.open).props("outline")
 
     def use_board(self) -> None:
@@ -116,7 +115,6 @@ class CalibratePanel:
             values = {"file": CALIBRATED, "control_points": None}
             self.session.set_table("calibration", values, f"calibration by {CALIBRATED}")
             write_report(self.session.folder, command.output())
-        self.is_new = True
         self.results.refresh()
 
     def _start(self, source: dict[str, Any], media: dict[str, dict[str, Any]]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 from nicegui import ui
 
@@ -15,9 +15,9 @@ from airborne.studio.trial_edits import with_cameras, with_table
 class CameraNames:
     """One window's choice of a name in a calibration file for each camera of the trial."""
 
-    def __init__(self, session: Session) -> None:
-        """Begin without a file."""
-        self.session = session
+    def __init__(self, session: Session, on_use: Callable[[], Awaitable[None]]) -> None:
+        """Begin without a file; `on_use` is called when the names are written."""
+        self.session, self._on_use = session, on_use
 
     def build(self) -> None:
         """Keep a place, which is empty until a file is chosen."""
@@ -39,17 +39,18 @@ class CameraNames:
             for choice in chosen.values():
                 choice.props("outlined dense options-dense").style("min-width: 150px")
 
-            def write() -> None:
-                self.write(file, {name: choice.value for name, choice in chosen.items()})
+            async def write() -> None:
+                await self.write(file, {name: choice.value for name, choice in chosen.items()})
 
             ui.button("Use these names", on_click=write).props("unelevated")
 
-    def write(self, file: str, chosen: dict[str, str | None]) -> None:
+    async def write(self, file: str, chosen: dict[str, str | None]) -> None:
         """Write the file and the names into the trial."""
         if len({*chosen.values()} - {None}) < len(chosen):
             complain("choose a camera of the file for each, and none twice")
             return
         use_calibration(self.session, {"file": file, "control_points": None}, chosen)
+        await self._on_use()
 
 
 def use_calibration(session: Session, table: dict[str, str | None], names: dict[str, str | None]) -> None:
@@ -63,4 +64,3 @@ def use_calibration(session: Session, table: dict[str, str | None], names: dict[
             lambda text: with_table(with_cameras(text, session.path.stem, cameras), "calibration", table),
             f"calibration by {table['file'] or table['control_points']}",
         )
-        ui.navigate.reload()

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Callable, Hashable, Mapping, Sequence
+from typing import Any
 
 from nicegui import ui
 
 from airborne.calibration.sources.court import Net
 from airborne.cameras import Camera, Rig
-from airborne.errors import count
+from airborne.errors import AirborneError, count
 from airborne.studio.calibrating import NETS, court_text, read_deviations, read_findings
 from airborne.studio.calibrations import ENDINGS, Calibrations, list_calibrations
-from airborne.studio.clicks import list_surveys
-from airborne.studio.folder import outer_files
+from airborne.studio.clicks import Surveys, list_surveys
+from airborne.studio.folder import file_stamp, files_inside, outer_files
 from airborne.studio.pages.calibrate import CalibratePanel
 from airborne.studio.pages.camera_names import CameraNames, use_calibration
 from airborne.studio.pages.control_points import ControlPointsPanel
@@ -26,73 +28,136 @@ from airborne.studio.pages.layout import (
     show_findings,
     work,
 )
+from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras
 
 _HELP = (
-    "To use a calibration from another program, put its file beside the videos and reload this page. Or click surveyed "
+    "To use a calibration from another program, put its file beside the videos. Or click surveyed "
     "points, or those of a court: at least six in each camera, spread over the space in which the body moves; "
     "residuals are drawn ten times as long. Or calibrate with a board or a wand."
+)
+_NOTHING = (
+    "The folder holds neither a calibration of these cameras nor a table of surveyed points (point,x_m,y_m,z_m). "
+    "Put one there; or click the points of a court, or calibrate with a board or a wand."
 )
 
 
 async def cameras_page(session: Session) -> None:
     """Let the user choose a calibration file, or a survey and click its points."""
     async with page_frame(session, "Cameras", "Where are the cameras?", _HELP) as changed:
-        project = session.project()
         if name_missing_steps(session, "camera"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:
             return
-        wanted = {camera.calibrated_as or camera.name for camera in project.cameras}
-        files = await in_thread(list_calibrations, session.folder, wanted, says="reading the calibrations")
-        name_outer_links(outer_files(session.folder, *ENDINGS))
-        surveys = await in_thread(list_surveys, session.folder, says="reading the surveys")
-        table = project.table("calibration")
-        if not (files.usable or files.renamed or surveys or table):
-            ui.label(
-                "The folder holds neither a calibration of these cameras nor a table of surveyed points "
-                "(point,x_m,y_m,z_m). Put one there and reload this page; or click the points of a court, or calibrate "
-                "with a board or a wand."
-            ).classes("warn")
-        names_form = CameraNames(session)
+        page = _Page(session, shown)
+        await page.build()
+        changed.append(page.reread)
+
+
+class _Page:
+    """One window's choice of a calibration and what it shows, which follow the trial whoever changes it."""
+
+    def __init__(self, session: Session, shown: ShownTrial) -> None:
+        self.session, self.shown = session, shown
+        self.panel: ControlPointsPanel | None = None
+        self.stamps: Hashable = None  # of the files that were looked at
+        self.built: Hashable = None  # what the page was built of
+        self._one_at_a_time = asyncio.Lock()
+
+    async def build(self) -> None:
+        """Lay out what can be chosen, and what the trial has."""
+        name_outer_links(outer_files(self.session.folder, *ENDINGS))
+        self.notes = ui.element("div").style("display: contents")
         with ui.element("div").classes("row-line"):
-            _chooser(session, files, surveys, names_form)
-            CalibratePanel(session, shown).build()
+            self.chooser = ui.element("div").style("display: contents")
+            CalibratePanel(self.session, self.shown).build()
+        self.area = ui.element("div").style("display: contents")
+        await self.reread()
+
+    async def reread(self) -> None:
+        """Show what the trial and its folder hold now: undo, another window or another program may have changed it."""
+        async with self._one_at_a_time:
+            with self.area:  # stays, while the choice that called this may go
+                await self._reread()
+
+    async def _reread(self) -> None:
+        session = self.session
+        if self.panel is not None and not await self.panel.reread():
+            self.panel = None
+        own = None if self.panel is None else self.panel.file  # its clicks make no other calibration
+        paths = files_inside(session.folder, *ENDINGS)
+        stamps = tuple(file_stamp(path) for path in paths if path.name != own)
+        if stamps == self.stamps:
+            return
+        self.stamps = stamps
+        project = session.project()
+        wanted, table = {each.calibrated_as or each.name for each in project.cameras}, project.table("calibration")
+        surveys = await in_thread(list_surveys, session.folder, says="reading the surveys")
+        files = await in_thread(list_calibrations, session.folder, wanted, says="reading the calibrations")
+        chosen = file_stamp(session.folder / str(table["file"])) if "file" in table else None
+        built = repr((table, files, surveys, chosen))
+        if built != self.built:
+            self.built = built
+            self._show_choices(table, files, surveys)
+            await self._show_calibration(table, surveys)
+
+    def _show_choices(self, table: dict[str, Any], files: Calibrations, surveys: Surveys) -> None:
+        self.notes.clear()
+        with self.notes:
+            for name, reason in surveys.refused.items():
+                ui.label(f"{name} is refused as surveyed points: {reason}").classes("warn")
+            if not (files.usable or files.renamed or surveys.usable or surveys.refused or table):
+                ui.label(_NOTHING).classes("warn")
+        self.chooser.clear()
+        names_form = CameraNames(self.session, self.reread)
+        with self.chooser:
+            _chooser(self.session, files, surveys.usable, names_form, self.reread)
+        self.area.clear()
         names_form.build()
-        _show_refused(session, files)
-        if table.get("control_points"):
-            panel = await ControlPointsPanel.open(session, shown, str(table["control_points"]))
-            if panel is not None:
-                changed.append(panel.reread)
-        elif table.get("file"):
-            rig = await work("reading the calibration", session.rig)
-            if rig is not None:
-                _show_rig(rig, _findings_of(session, str(table["file"])), _deviations_of(session, str(table["file"])))
+        _show_refused(self.session, files)
+
+    async def _show_calibration(self, table: dict[str, Any], surveys: Surveys) -> None:
+        self.panel = None
+        points, file = str(table.get("control_points", "")), str(table.get("file", ""))
+        try:
+            if points and points not in surveys.refused:  # else the page says so already
+                self.panel = await ControlPointsPanel.open(self.session, self.shown, points)
+            elif file and not points:
+                rig = await in_thread(self.session.rig, says="reading the calibration")
+                _show_rig(rig, _findings_of(self.session, file), _deviations_of(self.session, file))
+        except AirborneError as error:
+            ui.label(str(error)).classes("bad")
 
 
-def _chooser(session: Session, files: Calibrations, surveys: list[str], names_form: CameraNames) -> None:
+def _chooser(
+    session: Session,
+    files: Calibrations,
+    surveys: Sequence[str],
+    names_form: CameraNames,
+    on_use: Callable[[], Awaitable[None]],
+) -> None:
     table = session.project().table("calibration")
 
-    def use(key: str, name: str) -> None:
-        if table.get(key) == name:
+    async def use(key: str, name: str) -> None:
+        if session.project().table("calibration").get(key) == name:
             return
         if key == "file" and name in files.renamed:
             names_form.show(name, files.renamed[name])
             return
         calibrated_as = {each.name: each.calibrated_as for each in session.project().cameras} if key == "file" else {}
         use_calibration(session, {"file": None, "control_points": None, key: name}, calibrated_as)
+        await on_use()
 
-    def use_court(net: Net) -> None:
-        name = f"court_{net}.csv"
+    async def use_court(net: Net) -> None:
         with errors_shown():
-            if not (session.folder / name).exists():
-                session.edit(name, court_text(net), "points of a court")
-            use("control_points", name)
+            if not (session.folder / _court_file(net)).exists():
+                session.edit(_court_file(net), court_text(net), "points of a court")
+            await use("control_points", _court_file(net))
 
     both = [*files.usable, *files.renamed]
-    for key, names, label in (("file", both, "calibration file"), ("control_points", surveys, "surveyed points")):
+    for key, names, label in (("file", both, "calibration file"), ("control_points", list(surveys), "surveyed points")):
         if names:
             present = table.get(key)
             ui.select(
@@ -101,8 +166,13 @@ def _chooser(session: Session, files: Calibrations, surveys: list[str], names_fo
                 value=present if present in names else None,
                 on_change=lambda event, key=key: use(key, event.value),
             ).props("outlined dense options-dense").style("min-width: 220px")
-    court = ui.select(NETS, label="volleyball court", on_change=lambda event: use_court(event.value))
+    present = next((net for net in NETS if table.get("control_points") == _court_file(net)), None)
+    court = ui.select(NETS, label="volleyball court", value=present, on_change=lambda event: use_court(event.value))
     court.props("outlined dense options-dense").style("min-width: 200px")
+
+
+def _court_file(net: Net) -> str:
+    return f"court_{net}.csv"
 
 
 def _show_refused(session: Session, files: Calibrations) -> None:

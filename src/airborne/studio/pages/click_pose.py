@@ -1,4 +1,4 @@
-"""The first pose of a person: landmarks clicked with the epipolar curves' help, the body fitted as they are made."""
+"""The first pose of a body: landmarks clicked with the epipolar curves' help, the body fitted as they are made."""
 
 from __future__ import annotations
 
@@ -39,9 +39,11 @@ from airborne.studio.view import Drag, Mark
 
 _NEEDED = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 _HELP = (
-    "Go to the frame where tracking shall start. Choose a landmark and click it in two cameras or more: a click draws, "
-    "in the others, the curve on which it lies, give or take two deviations. Both hips and both shoulders are needed."
+    "Choose a landmark and click it in two cameras or more: a click draws, in the others, the curve on which it lies, "
+    "give or take two deviations."
 )
+_NEEDED_OF_PERSON = "Both hips and both shoulders are needed."
+_NEEDED_OF_THING = "Three landmarks that are not on one line are needed."
 
 
 class ClickPanel(PointsPanel):
@@ -72,7 +74,8 @@ class ClickPanel(PointsPanel):
 
     async def build(self) -> None:
         """Lay out the pictures and the list of landmarks, and show the clicks that there are."""
-        ui.label(f"{_HELP} {DRAG_HELP}").classes("help")
+        needed = _NEEDED_OF_PERSON if self.model.has_joints else _NEEDED_OF_THING
+        ui.label(f"{_HELP} {needed} {DRAG_HELP}").classes("help")
         with ui.element("div").classes("split"):
             with ui.element("div").classes("wide"):
                 self.build_views(self.frame, on_drag=self.drag)
@@ -80,10 +83,11 @@ class ClickPanel(PointsPanel):
                 with ui.element("div").classes("card"):
                     self.note = ui.label().classes("small")
                     self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
-                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
-                    ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                    FitButton(self.session, self.hand, lambda: self.frame, self.take_pose)
-                    self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
+                    with ui.element("div").classes("row-line tools"):
+                        ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
+                        ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
+                        FitButton(self.session, self.hand, lambda: self.frame, self.take_pose, self.latest.settle)
+                        self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
                 self.list = PointList(self.shown.names, self.choose)
         await self.show_frame()
         stored = read_pose(self.session, self.model)

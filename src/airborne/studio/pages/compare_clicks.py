@@ -31,7 +31,7 @@ class ClickComparison:
         if not runs:
             ui.label("Once there is a run, the clicks can be compared with it here.").classes("soft small")
             return
-        with ui.element("div").classes("row-line tight"):
+        with ui.element("div").classes("row-line tools"):
             choice = ui.select([run.name for run in runs], label="run", value=runs[0].name)
             choice.props("outlined dense options-dense").style("width: 106px")
             ui.button("Compare", on_click=lambda: self.compare(session.folder / choice.value)).props("flat dense")

@@ -12,11 +12,12 @@ from airborne.calibration.sources.court import court_lines
 from airborne.cameras import Rig
 from airborne.cameras.finding import Finding
 from airborne.errors import AirborneError, count
-from airborne.studio.clicks import Clicked, count_clicked, read_clicked
-from airborne.studio.pages.layout import complain, errors_shown, show_findings
+from airborne.studio.clicks import Clicked, count_clicked, read_survey
+from airborne.studio.pages.layout import complain, show_findings
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
+from airborne.studio.plan import plan_svg
 from airborne.studio.project import FEWEST_POINTS
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras, draw_rays
@@ -37,16 +38,9 @@ class ControlPointsPanel(PointsPanel):
         self.fits: dict[str, tuple[bytes, Calibration | str]] = {}  # camera -> of which clicks, and it
 
     @classmethod
-    async def open(cls, session: Session, shown: ShownTrial, file: str) -> ControlPointsPanel | None:
-        """Build the panel; complains, and returns None, where the table cannot be read."""
-        try:
-            clicked = read_clicked(session.project().file(file))
-            if clicked.world is None:
-                raise AirborneError(f"{file} has no columns x_m, y_m, z_m; expected surveyed points")
-        except AirborneError as error:
-            complain(error)
-            return None
-        panel = cls(session, shown, file, clicked)
+    async def open(cls, session: Session, shown: ShownTrial, file: str) -> ControlPointsPanel:
+        """Build the panel. Raises AirborneError where the table cannot be used."""
+        panel = cls(session, shown, file, read_survey(session.project().file(file)))
         panel.build()
         await panel.solve()
         return panel
@@ -61,13 +55,19 @@ class ControlPointsPanel(PointsPanel):
         """The table of surveyed points."""
         return self._file
 
-    async def reread(self) -> None:
-        """Show what the table holds now: another window, undo or another program may have changed it."""
-        with errors_shown():
-            clicked = read_clicked(self.session.project().file(self.file))
-            if self.text(clicked) != self.text(self.clicked):
-                self.clicked = clicked
-                await self.solve()
+    async def reread(self) -> bool:
+        """Show what the table holds now: another window, undo or another program may have changed it.
+
+        Say whether it can still be used.
+        """
+        try:
+            clicked = read_survey(self.session.project().file(self.file))
+        except AirborneError:
+            return False
+        if self.text(clicked) != self.text(self.clicked):
+            self.clicked = clicked
+            await self.solve()
+        return True
 
     def build(self) -> None:
         """Lay out the pictures and the list of points."""
@@ -78,8 +78,11 @@ class ControlPointsPanel(PointsPanel):
                 self.state = ui.refreshable(self._list_state)
                 with ui.element("div").classes("card"):
                     self.state()
-                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
-                    ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
+                    self.plan = ui.html(sanitize=False)
+                    self.place = ui.label().classes("soft small")
+                    with ui.element("div").classes("row-line tools"):
+                        ui.button("Remove the click", on_click=self.remove).props("flat dense")
+                        ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
                     self.scene = ui.element("div").style("height: 260px; display: flex")
                     self.scene.set_visibility(False)
                 self.list = PointList(self.shown.names, self.choose)
@@ -119,7 +122,17 @@ class ControlPointsPanel(PointsPanel):
         lines = [item for pane, camera in enumerate(self.shown.names) for item in self._court(pane, camera)]
         self.view.show_over(sorted(marks, key=lambda mark: mark.get("colour") != CHOSEN_COLOUR), lines, self.selected)
         self.list.show(self.clicked.names, self.chosen, self._off_px, self._findings_of_points())
+        self._show_plan()
         self.state.refresh()
+
+    def _show_plan(self) -> None:
+        """Mark the chosen point among all, from above."""
+        assert self.clicked.world is not None
+        row, points = self.clicked.names.index(self.chosen), self.clicked.world
+        lines = court_lines(dict(zip(self.clicked.names, points, strict=True)))
+        self.plan.set_content(plan_svg(points, row, lines))
+        x, y, z = points[row]
+        self.place.set_text(f"From above; the point is at x {x:.2f}, y {y:.2f}, z {z:.2f} m")
 
     def _marks(self, pane: int, camera: str) -> list[Mark]:
         marks: list[Mark] = []
@@ -174,8 +187,9 @@ class ControlPointsPanel(PointsPanel):
             else:
                 text, tone = f"{count(n, 'point')} of the {FEWEST_POINTS} that are needed", "warn"
             with ui.element("div"):
-                ui.label(camera).classes("name")
-                ui.label(text).classes(f"{tone} small")
+                with ui.element("div").classes("row-line tools"):
+                    ui.label(camera).classes("name")
+                    ui.label(text).classes(f"{tone} small")
                 show_findings(each.sentence for each in self._findings(camera) if not each.points)
 
     def _findings(self, camera: str) -> tuple[Finding, ...]:

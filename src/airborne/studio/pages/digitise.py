@@ -115,14 +115,14 @@ class DigitisePanel(PointsPanel):
             change = ui.button("Change", on_click=lambda: self.change_who(operator.value or "", number.value))
             change.props("flat dense")
         self.note = ui.label().classes("small")
-        with ui.element("div").classes("row-line tight"):
+        with ui.element("div").classes("row-line tools"):
             then = ui.select(_AFTER, label="after a click").bind_value(self, "then")
             then.props("outlined dense options-dense").style("width: 138px")
             help_on = ui.switch("epipolar help", value=False, on_change=lambda event: self.set_help(bool(event.value)))
             help_on.props("dense")
 
     def _build_points(self) -> None:
-        with ui.element("div").classes("row-line tight"):
+        with ui.element("div").classes("row-line tools"):
             name = ui.input("new point").props("dense outlined").style("width: 114px")
             ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
             ui.button("Drop", on_click=self.drop).props("flat dense").tooltip("the chosen point, one of your own")

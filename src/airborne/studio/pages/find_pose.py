@@ -55,10 +55,11 @@ class FindPanel:
                 self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to, on_drag=self.drag)
             with ui.element("div").classes("side"), ui.element("div").classes("card"):
                 self.controls.build()
-                ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
                 self.use = ui.button(_USE, on_click=self.write).props("unelevated")
-                FitButton(self.session, self.hand, lambda: self.at, self.take_pose)
-                self.stage = PoseStage(self.rig, self.hand, lambda: self.turn_to(self.frame), self.take_pose)
+                with ui.element("div").classes("row-line tools"):
+                    ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
+                    FitButton(self.session, self.hand, lambda: self.at, self.take_pose)
+                    self.stage = PoseStage(self.rig, self.hand, lambda: self.turn_to(self.frame), self.take_pose)
         await self.show_kept()
 
     async def show_kept(self) -> None:

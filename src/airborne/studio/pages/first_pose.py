@@ -14,10 +14,13 @@ from airborne.studio.pages.find_players import FindPlayersPanel
 from airborne.studio.pages.find_pose import FindPanel
 from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.session import Session
-from airborne.studio.starts import drafted_start
+from airborne.studio.starts import can_be_clicked, drafted_start
 
 _HELP = "Choose the frame where tracking starts, and place the body there. Each later frame follows from it."
 _CLICK, _FIND = "Click the points", "Find automatically"
+_NO_LANDMARKS = (
+    "To click points of this thing too, name three or more that are not on one line, as [[landmark]] in its body file."
+)
 
 
 async def first_pose_page(session: Session) -> None:
@@ -42,16 +45,21 @@ async def first_pose_page(session: Session) -> None:
             complain(error)
             return
         find = FindPanel(session, shown, rig, model, frame)
-        if model.has_joints:
+        if can_be_clicked(model):
             panel = ClickPanel(session, shown, rig, model, frame)
-            await _build_either(panel, find, changed)
+            await _build_either(panel, find, changed, first=_CLICK if model.has_joints else _FIND)
         else:
+            ui.label(_NO_LANDMARKS).classes("soft small")
             await find.build()
             changed.append(find.reread)
 
 
 async def _build_either(
-    click: ClickPanel | PlayersPanel, find: FindPanel | FindPlayersPanel, changed: list[Callable[[], Any]]
+    click: ClickPanel | PlayersPanel,
+    find: FindPanel | FindPlayersPanel,
+    changed: list[Callable[[], Any]],
+    *,
+    first: str = _CLICK,
 ) -> None:
     """Lay out the panel for clicks, or the one that finds, as the user chooses."""
 
@@ -64,7 +72,7 @@ async def _build_either(
         changed.append(chosen.reread)
 
     choice = (
-        ui.toggle([_CLICK, _FIND], value=_CLICK, on_change=build).props("dense no-caps").style("align-self: flex-start")
+        ui.toggle([_CLICK, _FIND], value=first, on_change=build).props("dense no-caps").style("align-self: flex-start")
     )
     area = ui.element("div").style("display: contents")
     await build()

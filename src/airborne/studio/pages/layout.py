@@ -63,8 +63,11 @@ async def page_frame(
     text: str,
     *,
     scrolls: bool = False,
+    task: str = "",
 ) -> AsyncIterator[list[Callable[[], Awaitable[None]]]]:
     """Lay out a page: `here` is its step, `text` its help. What it yields takes what to call when a file has changed.
+
+    `task` names a page beside the step's own in the guided walk.
 
     What stands in it is built once the window is there, so that it may take its time.
     """
@@ -113,7 +116,7 @@ async def page_frame(
             ui.html(f"<h1>{title}</h1>", sanitize=False)
             if text:
                 ui.label(text).classes("help")
-            guide = ui.refreshable(lambda: _guide(session, here))
+            guide = ui.refreshable(lambda: _guide(session, here, task))
             guide()
             await look()
             await ui.context.client.connected()
@@ -146,11 +149,11 @@ def _rail(session: Session, here: str) -> None:
             ui.label(step.says).classes("says")
 
 
-def _guide(session: Session, here: str) -> None:
+def _guide(session: Session, here: str, page: str) -> None:
     """Show what to do here in the guided walk."""
     if not session.is_guided:
         return
-    task, following = next_task(session.project(), here)
+    task, following = next_task(session.project(), here, page)
     with ui.element("div").classes("guide"):
         ui.html(task, sanitize=False)
         if following is not None:
@@ -268,6 +271,11 @@ class Latest:
         async with self._lock:
             result = await in_thread(function, *arguments, says=says) if asked == self._asked else None
         return result if asked == self._asked else None
+
+    async def settle(self) -> None:
+        """Wait until nothing that was asked for goes on."""
+        async with self._lock:
+            pass
 
 
 async def work(what: str, function: Callable[[], _T]) -> _T | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from functools import partial
+from html import escape
 
 import numpy as np
 from nicegui import ui
@@ -13,7 +14,7 @@ from nicegui.elements.label import Label
 from airborne.types import Array, Mask
 
 _NOT_CLICKED, _CLICKED = "–", "•"
-_NARROWEST_PX, _WIDEST_PX, _COLUMNS_PX = 24, 36, 176  # a column: 12.3 fits; cam1 does; all of them, beside the names
+_NARROWEST_PX, _WIDEST_PX, _COLUMNS_PX = 24, 36, 132  # a column: 12.3 fits; cam1 does; all of them, beside the names
 
 
 class PointList:
@@ -69,7 +70,7 @@ class PointList:
             for name in names:
                 with ui.element("button").classes("point") as row:
                     row.on("click", partial(self._choose, name), args=[])
-                    ui.label(name)
+                    ui.html(escape(name).replace("_", "_<wbr>"), sanitize=False)  # a long name is broken there
                     ui.element("div").classes("gap")
                     labels = [ui.label().classes("n") for _ in self._cameras]
                     for label, camera in zip(labels, self._cameras, strict=True):

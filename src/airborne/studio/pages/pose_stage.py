@@ -17,7 +17,7 @@ from airborne.studio.stage import BodyOnStage, Gizmo, draw_cameras
 from airborne.tracking.image_regions import bounding_points
 
 _BODY_MESH = "/body/mesh/{part}"
-_HEIGHT = "height: 300px; flex: none; display: flex"
+_HEIGHT = "height: 300px; width: 100%; flex: none; display: flex"
 _REACH = 0.6  # of the handles, of the body's longest side
 _AWAY = 1.2  # how far off the body is looked at from, of the same
 

@@ -28,7 +28,7 @@ _HELP = (
 
 async def ruler_page(session: Session) -> None:
     """Let the user measure a distance in the pictures."""
-    async with page_frame(session, "Body", "How long is it?", _HELP) as changed:
+    async with page_frame(session, "Body", "How long is it?", _HELP, task="ruler") as changed:
         if name_missing_steps(session, "camera", "calibration"):
             return
         shown = await work("indexing the videos", session.shown)

@@ -12,8 +12,10 @@ from airborne.errors import count
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import errors_shown, page_frame, work
+from airborne.studio.pages.points_panel import CAMERA_COLOURS
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
+from airborne.studio.sync_evidence import WAYS, curves_svg, level_curves
 from airborne.studio.trial_edits import with_cameras
 from airborne.studio.view import CameraViews
 from airborne.sync.offsets import fit_line
@@ -22,13 +24,14 @@ _HELP = (
     "Step each camera to the same event, a foot that lands or a ball that is hit, and press E. "
     "Several events narrow the offset down: each gives it to within half a frame."
 )
+_MOMENT = "steps the other camera to the moment of the clock's picture, by the offset that the trial has"
 _DRAFT = "events"  # their name among the drafts: the two videos -> pairs of pictures
 _WAYS = {"motion": "motion", "flash": "a flash", "sound": "sound", "tracking": "tracking the body"}
 
 
 async def sync_page(session: Session) -> None:
     """Let the user find the offset of each camera from the first one's clock."""
-    async with page_frame(session, "Videos", "Are the cameras synchronised?", _HELP) as changed:
+    async with page_frame(session, "Videos", "Are the cameras synchronised?", _HELP, task="sync") as changed:
         if len(session.project().cameras) < 2:
             ui.label("Choose two cameras or more first, in the step Videos.").classes("warn")
             return
@@ -56,6 +59,7 @@ class _Panel:
             choice.props("outlined dense options-dense").style("min-width: 160px")
             ui.button("Same event", on_click=self.add).props("unelevated")
             ui.button("Remove the last event", on_click=self.take_back).props("flat dense")
+            ui.button("Show the same moment", on_click=self.show_moment).props("flat dense").tooltip(_MOMENT)
             self.use = ui.button("Use this offset", on_click=self.write).props("unelevated")
             self.says = ui.label().classes("small")
         with ui.element("div").classes("split"):
@@ -71,6 +75,7 @@ class _Panel:
             self.watch = CommandWatch(self.session, "sync", self.show_answer, words="looking for the offsets")
             self.watch.buttons = [find]
             self.watch.says.style("white-space: pre-line")
+        self.evidence = ui.element("div").classes("row-line")
         self.choose(1)
 
     def choose(self, other: int) -> None:
@@ -80,7 +85,7 @@ class _Panel:
         self.right.clear()
         with self.right:
             self.labels = [self.labels[0], ui.label().classes("small name")]
-            CameraViews(self.shown, frame=0, camera=other, on_frame=lambda number: self.turn(1, number))
+            self.view = CameraViews(self.shown, frame=0, camera=other, on_frame=lambda number: self.turn(1, number))
         self.show()
 
     def turn(self, side: int, number: int) -> None:
@@ -153,6 +158,17 @@ class _Panel:
         offset_s, sd_s, *_ = fit_line(np.zeros(len(pairs)), np.array(offsets), sds, with_drift=False)
         return offset_s, sd_s
 
+    async def show_moment(self) -> None:
+        """Step the other camera to what it saw when the clock's picture was taken, by the offset that the trial has."""
+        shown = await work("indexing the videos", self.session.shown)  # with the offsets of now
+        if shown is None:
+            return
+        here, there = shown.sources[0], shown.sources[self.other]
+        moment = here.trial_time(self.time(0, self.at[0]))
+        pictures = range(len(self.shown.indexes[self.other]))
+        times = [abs(there.trial_time(self.time(self.other, number)) - moment) for number in pictures]
+        self.view.go(times.index(min(times)))
+
     def time(self, camera: int, number: int) -> Fraction:
         """Return when a camera's picture was taken, since its first."""
         times, unit = self.shown.indexes[camera].times()
@@ -181,6 +197,24 @@ class _Panel:
         trial = self.session.path.name
         self.watch.start("sync", trial, "--by", way, writes=trial, what="offsets found")
 
-    def show_answer(self, command: Command) -> None:
-        """Show what it has found."""
+    async def show_answer(self, command: Command) -> None:
+        """Show what it has found, and the two pictures of one moment by that."""
         self.watch.says.set_text(command.output().strip())
+        await self.show_moment()
+        await self.show_curves(next((way for way in WAYS if f"--by {way}" in command.line), None))
+
+    async def show_curves(self, way: str | None) -> None:
+        """Show what the cameras saw or heard about the moment that tells most, on the clock that was found."""
+        self.evidence.clear()
+        if way is None:
+            return
+        curves = await work("reading the curves", lambda: level_curves(way, self.session.shown().sources))
+        if curves is not None:
+            with self.evidence:
+                ui.html(curves_svg(curves, CAMERA_COLOURS), sanitize=False)
+                with ui.element("div"):
+                    ui.label(f"{WAYS[way]}, one second of it: the curves must rise together").classes("small soft")
+                    for name, colour in zip(self.shown.names, CAMERA_COLOURS, strict=False):
+                        with ui.element("div").classes("row-line small"):
+                            ui.element("span").style(f"width: 22px; height: 3px; background: {colour}")
+                            ui.label(name)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from nicegui import ui
 
-from airborne.body.files import read_body
-from airborne.errors import AirborneError, TrialError
-from airborne.io.names import check_name
+from airborne.errors import AirborneError
 from airborne.studio.folder import files_inside
 from airborne.studio.pages.body import save_body
 from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.things import MESHES, Solid, colour_at, parse_thing, thing_text
+from airborne.studio.things import LABELS, MESHES, Solid, check_thing, colour_at, parse_thing, thing_text
 from airborne.studio.view import CameraViews
 from airborne.studio.writing import read_if_there
 
@@ -26,12 +25,12 @@ _HELP = (
 _DRAFT = "thing"  # its name among the drafts
 _SOON = "debounce=300"  # [ms] after the last key: a number is one change, not one for each digit
 _WORDS = {"size_mm": "lengths", "centre_mm": "centre", "turn_deg": "turn", "scale": "unit"}  # of an undo
-_FIELDS = {"size_mm": "lengths [mm]", "centre_mm": "centre [mm]", "turn_deg": "turned about [°]"}
+_FIELDS = ("size_mm", "centre_mm", "turn_deg")
 
 
 async def thing_page(session: Session) -> None:
     """Let the user describe a thing."""
-    async with page_frame(session, "Body", "What is it made of?", _HELP) as changed:
+    async with page_frame(session, "Body", "What is it made of?", _HELP, task="thing") as changed:
         if name_missing_steps(session, "camera"):
             return
         shown = await work("indexing the videos", session.shown)
@@ -112,18 +111,14 @@ class ThingPanel:
         with errors_shown():
             self.name, self.solids = parse_thing(self.text, _FILE)
 
-    def write(self) -> None:
-        """Write the thing into its file, and the file into the trial."""
-        with errors_shown():
-            try:
-                names = [check_name(solid.name) for solid in self.solids]
-            except ValueError as error:
-                raise TrialError(str(error)) from None
-            if len(set(names)) < len(names):
-                raise TrialError("two solids have the same name; give each its own")
-            self.session.edit(_FILE, thing_text(self.name or "thing", self.solids), "thing described")
-            read_body(self.session.file(_FILE))
-            save_body(self.session, {"file": _FILE})
+    async def write(self) -> None:
+        """Write the thing into its file, and the file into the trial, where it can be used."""
+        name, solids = self.name or "thing", list(self.solids)
+        text = await work("reading the thing", lambda: check_thing(self.session.folder, _FILE, name, solids))
+        if text is not None:
+            with errors_shown():
+                self.session.edit(_FILE, text, "thing described")
+                save_body(self.session, {"file": _FILE})
 
     def _form(self) -> None:
         """Lay out the solids, and what can be changed of the chosen one."""
@@ -141,15 +136,16 @@ class ThingPanel:
             shape.props("outlined dense options-dense").style("width: 130px")
         is_mesh = solid.shape not in ("box", "ellipsoid")
         if is_mesh:
-            unit = ui.number("its unit [m]", value=solid.scale, min=1e-6, on_change=lambda e: self._number("scale", e))
+            value = _shown(solid.scale)
+            unit = ui.number(LABELS["scale"], value=value, on_change=lambda e: self._number("scale", e))
             unit.props(f"outlined dense {_SOON}").style("width: 110px")
         for key in _FIELDS if not is_mesh else ("centre_mm", "turn_deg"):
-            ui.label(_FIELDS[key]).classes("small soft")
+            ui.label(LABELS[key]).classes("small soft")
             with ui.element("div").classes("row-line"):
                 for k, axis in enumerate("xyz"):
-                    value = getattr(solid, key)[k]
+                    value = _shown(getattr(solid, key)[k])
                     number = ui.number(axis, value=value, on_change=lambda e, key=key, k=k: self._number(key, e, k))
-                    number.props(f'outlined dense {_SOON} aria-label="{_FIELDS[key]} {axis}"').style("width: 84px")
+                    number.props(f'outlined dense {_SOON} aria-label="{LABELS[key]} {axis}"').style("width: 84px")
         with ui.element("div").classes("row-line"):
             if solid.colour is not None:
                 shade = f"rgb({', '.join(map(str, solid.colour))})"
@@ -159,7 +155,7 @@ class ThingPanel:
                 ui.label("colour: taken at the first pose").classes("small soft")
 
     def _number(self, key: str, event, k: int | None = None) -> None:
-        value = float(event.value or 0)
+        value = math.nan if event.value is None else float(event.value)
         old = getattr(self.solids[self.chosen], key)
         self.change(**{key: value if k is None else (*old[:k], value, *old[k + 1 :])})
 
@@ -183,3 +179,8 @@ class ThingPanel:
         del self.solids[self.chosen]
         self.keep("solid removed")
         self._choose(0)
+
+
+def _shown(value: float) -> float | None:
+    """Return what a field shows of a number: nothing where it is missing."""
+    return None if math.isnan(value) else value

@@ -42,7 +42,7 @@ async def videos_page(session: Session) -> None:
         "Tick the files that are cameras of one recording; the first one is the clock. "
         "Interlaced files hold two fields in each picture, and so give twice as many images a second."
     )
-    async with page_frame(session, "Videos", "Which videos are the cameras?", text, scrolls=True):
+    async with page_frame(session, "Videos", "Which videos are the cameras?", text, scrolls=True) as changed:
         project = session.project()
         if project.mistake:
             ui.label(project.mistake).classes("bad")
@@ -55,18 +55,34 @@ async def videos_page(session: Session) -> None:
             ui.label(f"{session.folder} holds no videos; copy them there, then reload this page.").classes("warn")
             return
         choices: list[_Choice] = []
+        clock = ui.refreshable(lambda: _link_to_clock(session))
+
+        def save() -> None:
+            _save(session, choices)
+            clock.refresh()
+
+        async def show_anew() -> None:
+            clock.refresh()
+
+        with ui.element("div").classes("row-line"):
+            use = ui.button("Use these cameras", on_click=save).props("unelevated")
+            use.disable()
+            ui.label(f"writes {session.path.name}").classes("soft small")
+            clock()
         with ui.element("div").classes("files"):
             for path in files:
                 facts = await in_thread(_facts, path, says=f"looking at {path.name}")
                 choices.append(_choose(project, path, facts))
                 _card(choices[-1], facts)
-        with ui.element("div").classes("row-line"):
-            use = ui.button("Use these cameras", on_click=lambda: _save(session, choices)).props("unelevated")
-            use.set_enabled(project.mistake is None)
-            ui.label(f"writes {session.path.name}").classes("soft small")
-            if len(project.cameras) > 1:
-                with ui.element("a").props('href="/sync"').classes("plain"):
-                    ui.label("Put them on one clock")
+        use.set_enabled(project.mistake is None)
+        changed.append(show_anew)
+
+
+def _link_to_clock(session: Session) -> None:
+    """Show the way to one clock, where the trial has several cameras."""
+    if len(session.project().cameras) > 1:
+        with ui.element("a").props('href="/sync"').classes("plain"):
+            ui.label("Put them on one clock")
 
 
 def _facts(path: Path) -> VideoFacts | str:
