@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.body import surface_arrays, surface_of_segments
-from airborne.rendering import FLAT, evidence_maps, mask_evidence, render, uncovered_maps
+from airborne.rendering import FLAT, evidence_maps, mask_evidence, mask_out_surface, render
 from airborne.rendering.reduction import reduce_camera, reduce_image
 from tests.support.bodies import batch, camera, in_slabs, random_body
 
@@ -54,7 +54,7 @@ def test_segments_that_cover_first_leave_the_others_what_the_whole_body_covers_b
     surface, (R, t), maps = surface_arrays(model), batch(model, 6, 4), evidence_maps(CAMERAS, MAPS)
     is_first = np.arange(len(model.segments)) % 2 == 0
     first, others = surface_of_segments(surface, is_first), surface_of_segments(surface, ~is_first)
-    left = uncovered_maps(first, maps, R[0], t[0])
+    left = mask_out_surface(first, maps, R[0], t[0])
     np.testing.assert_allclose(left.totals, maps.totals - mask_evidence(first, maps, R[:1], t[:1])[0], atol=SUM)
     R[:, is_first], t[:, is_first] = R[0, is_first], t[0, is_first]
     beyond = mask_evidence(others, left, R, t)

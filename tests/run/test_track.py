@@ -24,7 +24,7 @@ def calls(monkeypatch):
     """Count the calls of the readers, by name and first argument, wherever they are imported."""
     counts = Counter()
 
-    def counted(reader):
+    def n_done(reader):
         def call(what, *args, **kwargs):
             counts[reader.__name__, str(getattr(what, "path", what)).rpartition("/")[2]] += 1
             return reader(what, *args, **kwargs)
@@ -32,7 +32,7 @@ def calls(monkeypatch):
         return call
 
     for reader in READERS:
-        replacement = counted(reader)
+        replacement = n_done(reader)
         for name, module in list(sys.modules.items()):
             if name.startswith("airborne") and getattr(module, reader.__name__, None) is reader:
                 monkeypatch.setattr(module, reader.__name__, replacement)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import SAMPLED, Pose, human18
 from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.run.first_pose import find_first_pose
-from airborne.studio.fitting import Fit
+from airborne.studio.fitting import FirstPoseFit
 from airborne.studio.pages import fit_pose
 from airborne.studio.starts import standing_pose
 from airborne.trial.file import read_trial
@@ -158,7 +158,7 @@ def fit_slowly():
 
     def fit(session, model, frame, pose):
         time.sleep(1)
-        return Fit(pose.move(np.array([0, 0, MOVED_M]), np.zeros(3)), True, np.full(3, 0.003), ())
+        return FirstPoseFit(pose.move(np.array([0, 0, MOVED_M]), np.zeros(3)), True, np.full(3, 0.003), ())
 
     fit_pose.fit_to_frame = fit
 

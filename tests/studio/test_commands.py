@@ -28,9 +28,9 @@ def test_two_commands_of_one_kind_say_each_its_own(tmp_path):
     assert ["no_run" in each.complaint() for each in commands] == [True, False]
     assert "no_other" in commands[1].complaint()
     commands[0]._log.write_text("airborne: compiling\ntracking cross: a throw: 3 of 34\n")
-    assert (commands[0].how_far(), commands[0].counted()) == ("3 of 34", 3)
+    assert (commands[0].how_far(), commands[0].n_done()) == ("3 of 34", 3)
     commands[0]._log.write_text("airborne: compiling: up to a minute\n")
-    assert (commands[0].how_far(), commands[0].counted()) == ("compiling: up to a minute", 0)
+    assert (commands[0].how_far(), commands[0].n_done()) == ("compiling: up to a minute", 0)
 
 
 def test_a_command_says_from_the_first_moment_what_it_does_and_how_far_it_is(tmp_path):

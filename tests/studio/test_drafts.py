@@ -8,11 +8,11 @@ import pytest
 from airborne.studio.drafts import DRAFTS
 from airborne.studio.session import Session
 from airborne.studio.starts import (
-    drafted_pose,
-    drafted_start,
     is_newer_than_clicks,
     keep_start,
     points_name,
+    read_draft_pose,
+    read_draft_start,
     standing_pose,
     start_from_pose,
     write_start,
@@ -59,33 +59,33 @@ def test_drafts_of_two_trials_of_a_folder_are_apart(session):
 def test_a_draft_that_is_none_is_nothing(session, text):
     session.keep_draft("start", {}, "pose set")
     (session.folder / DRAFTS).write_text(text)
-    assert drafted_start(reopened(session)) is None
+    assert read_draft_start(reopened(session)) is None
 
 
 def test_a_drafted_start_waits_until_the_trial_has_another(session):
     keep_start(session, start_at(0.1), "pose set by hand")
-    assert drafted_start(reopened(session)) == start_at(0.1)
-    write_start(session, drafted_start(session))
-    assert drafted_start(reopened(session)) == start_at(0.1)  # the trial's own, too
+    assert read_draft_start(reopened(session)) == start_at(0.1)
+    write_start(session, read_draft_start(session))
+    assert read_draft_start(reopened(session)) == start_at(0.1)  # the trial's own, too
     write_start(session, start_at(0.2))
-    assert drafted_start(reopened(session)) is None
+    assert read_draft_start(reopened(session)) is None
     session.editor.undo()
-    assert drafted_start(session) == start_at(0.1)
+    assert read_draft_start(session) == start_at(0.1)
 
 
 def test_clicks_made_since_are_newer_than_a_drafted_start(session):
     keep_start(session, start_at(0.1), "pose set by hand")
-    assert is_newer_than_clicks(session, drafted_start(session))
+    assert is_newer_than_clicks(session, read_draft_start(session))
     session.edit(points_name(3), "point,cam1_u,cam1_v\nhip_left,1.0,2.0\n", "hip_left clicked")
-    assert not is_newer_than_clicks(session, drafted_start(session))
+    assert not is_newer_than_clicks(session, read_draft_start(session))
     session.editor.undo()
-    assert is_newer_than_clicks(session, drafted_start(session))
+    assert is_newer_than_clicks(session, read_draft_start(session))
 
 
 def test_a_drafted_pose_is_that_of_its_body_or_none(session):
     model = session.project().model()
     pose = standing_pose(model, session.rig())
-    found = drafted_pose(model, start_from_pose(model, 3, pose))
+    found = read_draft_pose(model, start_from_pose(model, 3, pose))
     np.testing.assert_allclose(found.world_from_root.translation, pose.world_from_root.translation, atol=1e-4)
-    assert drafted_pose(model, {**start_at(0.1), "joint_angles_deg": {"knee_left": [9.0, 0.0, 0.0]}}) is None
-    assert drafted_pose(model, {"frame": 3, "player": [{"name": "a", "joints_m": {}}]}) is None
+    assert read_draft_pose(model, {**start_at(0.1), "joint_angles_deg": {"knee_left": [9.0, 0.0, 0.0]}}) is None
+    assert read_draft_pose(model, {"frame": 3, "player": [{"name": "a", "joints_m": {}}]}) is None

@@ -60,13 +60,13 @@ def describe_corrections(summary: Mapping[str, Any]) -> list[str]:
         by_form: dict[str, list[str]] = {}
         for key in keys:
             by_form.setdefault(_forms(key), []).append(str(key["frame"]))
-        groups = ", ".join(f"{_listed(frames)} ({form})" for form, frames in by_form.items())
+        groups = ", ".join(f"{_join_words(frames)} ({form})" for form, frames in by_form.items())
         text.append(f"The pose was corrected in {count(len(keys), 'frame')}: {groups}.")
     stretches: dict[str, list[str]] = {}
     for mask in masks:
         first, last = mask["first"], mask["last"]
         stretches.setdefault(mask["camera"], []).append(str(first) if first == last else f"{first} to {last}")
-    left_out = "; ".join(f"{camera} of {_listed(frames)}" for camera, frames in stretches.items())
+    left_out = "; ".join(f"{camera} of {_join_words(frames)}" for camera, frames in stretches.items())
     return [*text, *([f"Cameras were left out of some frames: {left_out}."] if masks else [])]
 
 
@@ -77,7 +77,7 @@ def _forms(key: Mapping[str, Any]) -> str:
     return f"{' and '.join(key['gives'])}, {' and '.join(sds)}"
 
 
-def _listed(words: Sequence[str]) -> str:
+def _join_words(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 

@@ -1,7 +1,7 @@
 """Rendering: in come a body's geometry, its poses and cameras, out come scores, maps and images; knows no search."""
 
 from airborne.rendering.drawing import Rendering, render
-from airborne.rendering.evidence import EvidenceMaps, evidence_maps, mask_evidence, uncovered_maps
+from airborne.rendering.evidence import EvidenceMaps, evidence_maps, mask_evidence, mask_out_surface
 from airborne.rendering.lights import FLAT, Lamp, Lights
 from airborne.rendering.pictures import mask_picture, match_picture, model_picture, through_mask
 from airborne.rendering.scores import RULES, ScoreRule, colour_sums, missed_pixels, score, scores_from_sums
@@ -19,6 +19,7 @@ __all__ = [
     "colour_sums",
     "evidence_maps",
     "mask_evidence",
+    "mask_out_surface",
     "mask_picture",
     "match_picture",
     "missed_pixels",
@@ -28,5 +29,4 @@ __all__ = [
     "score",
     "scores_from_sums",
     "through_mask",
-    "uncovered_maps",
 ]

@@ -69,7 +69,7 @@ def mask_evidence(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Arra
     return out
 
 
-def uncovered_maps(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Array) -> EvidenceMaps:
+def mask_out_surface(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Array) -> EvidenceMaps:
     """Return the maps without what a posed body covers: zero there. R (s, 3, 3), t (s, 3) [m], world from segment.
 
     Of masks that share some segments, only the others have to be drawn on what these leave.
@@ -105,7 +105,7 @@ def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
 
 @kernel(fastmath=True)
 def _sum_uncovered(shapes, geometry, R, t, views, sizes, sums, out):
-    """Fill `out`, as `sums`, without the pixels that a body covers; see `uncovered_maps`."""
+    """Fill `out`, as `sums`, without the pixels that a body covers; see `mask_out_surface`."""
     pose_shapes(shapes, geometry, R, t)
     for i in range(len(views)):
         width, height, offset = sizes[i, 0], sizes[i, 1], sizes[i, 2]

@@ -13,7 +13,7 @@ from airborne.run.detections import read_trial_detections
 from airborne.run.first_pose import find_first_pose
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
-from airborne.run.opening import Opened, calibrated_cameras, open_trial, past_the_end_error, video_source
+from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source
 from airborne.run.players_tracker import players_tracker_of
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import parse_remainder
@@ -96,7 +96,7 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
     if facts and _exists(trial, calibration.file or calibration.control_points):
         sizes = {name: each.size for name, each in facts.items()}
         checks.attempt(
-            lambda: calibrated_cameras(shown, sizes), lambda cameras: f"calibration: {', '.join(cameras[0].names)}"
+            lambda: read_or_calibrate(shown, sizes), lambda cameras: f"calibration: {', '.join(cameras[0].names)}"
         )
     if not trial.has_players and _exists(trial, body.source_file):
         checks.attempt(

@@ -77,7 +77,7 @@ def open_live(trial: Trial, waiting: Callable[[], None] = lambda: None) -> Itera
     """Connect to a trial's live cameras and find where they are; `waiting` is called until all deliver frames."""
     with connect([video_source(trial, camera) for camera in trial.camera], waiting) as cameras:
         sizes = {camera.source.name: camera.facts.size for camera in cameras if camera.facts is not None}
-        rig, calibration = calibrated_cameras(trial, sizes)
+        rig, calibration = read_or_calibrate(trial, sizes)
         recording = live_recording(
             cameras, rig, every=trial.track.every, start=trial.start.frame, stop=trial.track.stop
         )
@@ -88,7 +88,7 @@ def open_cameras(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Cam
     """Inspect a trial's videos and read its cameras and detections, each once."""
     facts = tuple(facts or (inspect(video_source(trial, camera)) for camera in trial.camera))
     sizes = {camera.name: each.size for camera, each in zip(trial.camera, facts, strict=True)}
-    rig, calibration = calibrated_cameras(trial, sizes)
+    rig, calibration = read_or_calibrate(trial, sizes)
     detections = read_trial_detections(trial, facts)
     notes: tuple[str, ...] = ()
     if detections is not None:
@@ -96,7 +96,7 @@ def open_cameras(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Cam
     return Cameras(rig, calibration, detections, facts, notes)
 
 
-def calibrated_cameras(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
+def read_or_calibrate(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
     """Return the calibrated cameras of images of these sizes (width, height) [px]."""
     if trial.calibration.control_points is not None:
         points = read_control_points(trial.path(trial.calibration.control_points))

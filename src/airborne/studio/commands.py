@@ -91,7 +91,7 @@ class Command:
         """Return the last line of what it says beside its output; of one that counts, the numbers."""
         return re.sub(r"^.*: (?=\d+ of \w+$)", "", self.progress())
 
-    def counted(self) -> int:
+    def n_done(self) -> int:
         """Return how many frames, or whatever it counts, it said last that it has done; 0 before it said so."""
         found = re.search(r"(\d+) of \d+$", self.progress())
         return int(found[1]) if found else 0

@@ -56,13 +56,16 @@ def look_for_disagreement(run: Path, frame: int, shown: ShownTrial, pictures: Pi
     row = int(np.searchsorted(rows.index, frame))
     frames = [int(each) for each in rows.index[max(0, row - _AROUND) : row + _AROUND + 1]]
     poses = {each: rows.pose(each) for each in frames if each < len(shown.clock)}
-    return describe_shifts(edge_shifts(model, poses, run_rig(run).select(shown.names).cameras, shown, pictures))
+    return describe_shifts(
+        edge_shifts(model, poses, run_rig(run).select(shown.names).cameras, shown=shown, pictures=pictures)
+    )
 
 
 def edge_shifts(
     model: BodyModel,
     poses: Mapping[int, Pose | None],
     cameras: Sequence[Camera],
+    *,
     shown: ShownTrial,
     pictures: Pictures,
 ) -> list[EdgeShift]:
@@ -140,11 +143,11 @@ def describe_shifts(shifts: Sequence[EdgeShift]) -> str:
     others = float(np.median([each.far_px for each in ranked[1:]])) if len(ranked) > 1 else 0.0
     is_one = ranked[0].stands_out and ranked[0].far_px > _TIMES_OTHERS * others
     verdict = f"{ranked[0].camera} disagrees" if is_one else "no camera disagrees with all others"
-    each = "; ".join(f"{s.camera} {_signed(s.px[0])}, {_signed(s.px[1])} px, sd {s.sd_px:.1f}" for s in ranked)
+    each = "; ".join(f"{s.camera} {_sign(s.px[0])}, {_sign(s.px[1])} px, sd {s.sd_px:.1f}" for s in ranked)
     return f"{verdict}. Edges lie off the outline, right and down: {each}"
 
 
-def _signed(px: float) -> str:
+def _sign(px: float) -> str:
     return f"{round(px, 1) + 0.0:+.1f}"  # no -0.0
 
 

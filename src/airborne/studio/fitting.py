@@ -24,7 +24,7 @@ _RUN = "fit"  # of one frame, in the folder of what the studio remembers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class FirstPoseFit:
     """A pose that was fitted to the pictures of a frame."""
 
     pose: Pose
@@ -33,7 +33,7 @@ class Fit:
     shifts: Sequence[EdgeShift]  # of the cameras that show enough of the body
 
 
-def fit_to_frame(session: Session, model: BodyModel, frame: int, pose: Pose) -> Fit:
+def fit_to_frame(session: Session, model: BodyModel, frame: int, pose: Pose) -> FirstPoseFit:
     """Return where the trial's method finds the body from a pose in a frame. Raises AirborneError."""
     start = StartTable(**start_from_pose(model, frame, pose))
     trial = session.project().trial()
@@ -45,11 +45,11 @@ def fit_to_frame(session: Session, model: BodyModel, frame: int, pose: Pose) -> 
     if row is None or fitted is None:
         raise ResultError("the body is not found at this pose; bring it nearer to where the pictures show it")
     cameras = session.rig().select(session.shown().names).cameras
-    shifts = edge_shifts(model, {frame: fitted}, cameras, session.shown(), session.pictures)
-    return Fit(fitted, str(rows.status[row]) == Status.TRACKED.value, rows.position_sd[row], shifts)
+    shifts = edge_shifts(model, {frame: fitted}, cameras, shown=session.shown(), pictures=session.pictures)
+    return FirstPoseFit(fitted, str(rows.status[row]) == Status.TRACKED.value, rows.position_sd[row], shifts)
 
 
-def describe_fit(fit: Fit) -> str:
+def describe_quality(fit: FirstPoseFit) -> str:
     """Say how well a pose fits: how far edges lie off its outline, in how many cameras, and how sure its place is."""
     x, y, z = 1e3 * fit.place_sd_m
     says = f"Place ± {x:.0f}, {y:.0f}, {z:.0f} mm (sd of x, y, z)."

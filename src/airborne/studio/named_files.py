@@ -36,7 +36,7 @@ def read_inner_tables(folder: Path, path: Path) -> dict[str, Any]:
     tables, base = _read_tables(folder, path)
     if base != path.parent:
         raise TrialError(f"{path.name}: its session is in another folder; put the trial beside it")
-    for key, name in _named(tables):
+    for key, name in _iterate_paths(tables):
         _refuse_outer(folder, path, key, name)
     file = tables["body"].get("file") if isinstance(tables.get("body"), dict) else None
     if isinstance(file, str):
@@ -73,7 +73,7 @@ def _refuse_outer(folder: Path, path: Path, key: str, name: Any) -> None:
             raise TrialError(f"{path.name}: {key}: {error}") from None
 
 
-def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _iterate_paths(tables: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the paths of a trial's tables, whatever else is wrong in them, each with its key."""
     start = tables.get("start")
     found = {**tables, "start.player": start.get("player") if isinstance(start, dict) else None}

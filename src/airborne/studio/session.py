@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, TrialError
-from airborne.run.opening import calibrated_cameras
+from airborne.run.opening import read_or_calibrate
 from airborne.studio.commands import Command, find_tracking
 from airborne.studio.drafts import DRAFTS, drafts_text, read_draft
 from airborne.studio.folder import file_stamp, path_inside
@@ -89,7 +89,7 @@ class Session:
             raise TrialError("the cameras are not calibrated yet; see the step Cameras")
         files = [project.file(str(table[key])) for key in ("file", "control_points") if key in table]
         stamp = project.cameras_stamp, repr(table), tuple(map(file_stamp, files))
-        return self._keep("rig", stamp, lambda: calibrated_cameras(self._as_far_as_cameras(), self.shown().sizes)[0])
+        return self._keep("rig", stamp, lambda: read_or_calibrate(self._as_far_as_cameras(), self.shown().sizes)[0])
 
     def file(self, name: str) -> Path:
         """Return the path of a file of the folder; raises TrialError where it leads out of it."""

@@ -122,7 +122,7 @@ def has_start(session: Session, start: dict[str, Any]) -> bool:
     return all(table.get(key) == value for key, value in start.items())
 
 
-def drafted_start(session: Session) -> dict[str, Any] | None:
+def read_draft_start(session: Session) -> dict[str, Any] | None:
     """Return the [start] that was made on a page last; None where there is none, or the trial got another since."""
     draft = session.draft(_DRAFT)
     try:
@@ -138,7 +138,7 @@ def is_newer_than_clicks(session: Session, start: dict[str, Any]) -> bool:
     return session.draft(_DRAFT).get("clicks") == _clicks_text(session, start)
 
 
-def drafted_pose(model: BodyModel, start: dict[str, Any] | None) -> Pose | None:
+def read_draft_pose(model: BodyModel, start: dict[str, Any] | None) -> Pose | None:
     """Return the pose of a drafted [start]; None where it is none of this body."""
     if start is None or "position_m" not in start:
         return None

@@ -34,7 +34,7 @@ def run_strips(run: Path) -> tuple[tuple[str, ...], NDArray[np.uint8]]:
         motion = run_players(run)
         return motion.players, ranks_of(motion.status)
     rows = run_rows(run)
-    if rows.joints and (finished := _finished_ranks(run, len(rows))) is not None:
+    if rows.joints and (finished := _ranks_of_joints(run, len(rows))) is not None:
         return finished
     if not rows.joints or len(rows) > _MOST_ROWS or not (run / BODY).is_file():
         return (), np.zeros((len(rows), 0), np.uint8)
@@ -68,7 +68,7 @@ def doubtful_frames(run: Path) -> dict[str, NDArray[np.int64]]:
     return {name: index[of_any.any(axis=1)] for name, of_any in is_doubtful.items()}
 
 
-def _finished_ranks(run: Path, n: int) -> tuple[tuple[str, ...], NDArray[np.uint8]] | None:
+def _ranks_of_joints(run: Path, n: int) -> tuple[tuple[str, ...], NDArray[np.uint8]] | None:
     """Return what a finished run's table says of its n frames; None where it has none, or one of another motion."""
     try:
         status, motion = (run / JOINTS).stat(), (run / MOTION).stat()

@@ -26,7 +26,7 @@ def level_curves(way: str, sources: Sequence[VideoSource]) -> list[Array]:
     curves = [_levels(way, source) for source in sources]
     first = curves[0]
     middle_s = float(first[1 + np.argmax(np.diff(first[:, 1])), 0]) if len(first) > 1 else 0.0
-    return [_scaled(curve[np.abs(curve[:, 0] - middle_s) <= _AROUND_S]) for curve in curves]
+    return [_scale(curve[np.abs(curve[:, 0] - middle_s) <= _AROUND_S]) for curve in curves]
 
 
 def curves_svg(curves: Sequence[Array], colours: Sequence[str]) -> str:
@@ -55,7 +55,7 @@ def _levels(way: str, source: VideoSource) -> Array:
     return np.stack([begin + time_s * (end - begin), level], axis=1)
 
 
-def _scaled(curve: Array) -> Array:
+def _scale(curve: Array) -> Array:
     if not len(curve):
         return curve
     low, high = curve[:, 1].min(), curve[:, 1].max()

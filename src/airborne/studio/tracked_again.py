@@ -101,24 +101,24 @@ def _farthest(key: PoseEvidence, pose: Pose, rig: Rig) -> _Miss:
     for mark, P, px, sd_px in zip(key.clicked, key.P, key.px, key.px_sds, strict=True):
         camera = rig.cameras[int(np.flatnonzero((rig.P == P).all(axis=(1, 2)))[0])]
         off_px = float(np.linalg.norm(camera.undistort_px(camera.px_from_world(points[mark])) - px))
-        found.append(_miss(f"the {names[mark]} is", off_px, "px", sd_px, f"from its click in {camera.name}"))
+        found.append(_miss(f"the {names[mark]} is", off_px, "px", sd=sd_px, than=f"from its click in {camera.name}"))
     for mark, position, sd_m in zip(key.landmarks, key.positions, key.position_sds, strict=True):
         off_m = float(np.linalg.norm(points[mark] - position))
-        found.append(_miss(f"the {names[mark]} is", 1e3 * off_m, "mm", 1e3 * sd_m, "from its place in the key"))
+        found.append(_miss(f"the {names[mark]} is", 1e3 * off_m, "mm", sd=1e3 * sd_m, than="from its place in the key"))
     if key.pose is not None:
         delta = delta_between(key.pose, pose)
         if np.isfinite(key.pose_sds[0]):
             off_m, sd_m = float(np.linalg.norm(delta[:3])), key.pose_sds[0]
-            found.append(_miss("the body is", 1e3 * off_m, "mm", 1e3 * sd_m, "from its place in the key"))
+            found.append(_miss("the body is", 1e3 * off_m, "mm", sd=1e3 * sd_m, than="from its place in the key"))
         turns = np.degrees(np.linalg.norm(delta[3:].reshape(-1, 3), axis=1))
         for part, (turn, sd) in enumerate(zip(turns, np.degrees(key.pose_sds[3::3]), strict=True)):
             if np.isfinite(sd):
                 what = "body" if part == 0 else _plain(key.model.segments[part].name)
-                found.append(_miss(f"the {what} is turned", float(turn), "°", sd, "from its key"))
+                found.append(_miss(f"the {what} is turned", float(turn), "°", sd=sd, than="from its key"))
     return max(found, key=lambda each: each.sds)
 
 
-def _miss(what: str, off: float, unit: str, sd: float, than: str) -> _Miss:
+def _miss(what: str, off: float, unit: str, *, sd: float, than: str) -> _Miss:
     space = "" if unit == "°" else " "
     return _Miss(off / sd, f"{what} {off:.1f}{space}{unit} {than} ({off / sd:.1f} sd)")
 

@@ -110,7 +110,7 @@ class CameraViews(Element, component="view.js", default_classes="view"):
         """The frame in view here; another window's is its own."""
         return self._frame
 
-    async def wanted(self) -> int:
+    async def latest_frame(self) -> int:
         """Return the frame that was asked for last here, whose pictures may be on their way."""
         with suppress(TimeoutError):
             return int(await self.run_method("wantedFrame", timeout=_PATIENCE_S) or 0)

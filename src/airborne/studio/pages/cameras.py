@@ -113,7 +113,7 @@ class _Page:
         self.chooser.clear()
         names_form = CameraNames(self.session, self.reread)
         with self.chooser:
-            _chooser(self.session, files, surveys.usable, names_form, self.reread)
+            _chooser(self.session, files, surveys.usable, names_form, on_use=self.reread)
         self.area.clear()
         names_form.build()
         _show_refused(self.session, files)
@@ -136,6 +136,7 @@ def _chooser(
     files: Calibrations,
     surveys: Sequence[str],
     names_form: CameraNames,
+    *,
     on_use: Callable[[], Awaitable[None]],
 ) -> None:
     table = session.project().table("calibration")

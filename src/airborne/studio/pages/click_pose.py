@@ -22,13 +22,13 @@ from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import (
     POSE_COLOUR,
-    drafted_pose,
-    drafted_start,
     fit_clicks,
     has_start,
     is_newer_than_clicks,
     keep_start,
     points_name,
+    read_draft_pose,
+    read_draft_start,
     read_points,
     read_pose,
     standing_pose,
@@ -86,7 +86,13 @@ class ClickPanel(PointsPanel):
                     with ui.element("div").classes("row-line tools"):
                         ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
                         ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                        FitButton(self.session, self.hand, lambda: self.frame, self.take_pose, self.latest.settle)
+                        FitButton(
+                            self.session,
+                            self.hand,
+                            frame_of=lambda: self.frame,
+                            on_fit=self.take_pose,
+                            settle=self.latest.settle,
+                        )
                         self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
                 self.list = PointList(self.shown.names, self.choose)
         await self.show_frame()
@@ -101,8 +107,8 @@ class ClickPanel(PointsPanel):
         self.selected, self.outline, self.says, self.is_by_hand = None, [], "", False
         self.clicked = Clicked((), None, {})
         with errors_shown():
-            self.clicked, self.kept = read_points(self.session, self.frame), self._drafted()
-        pose = drafted_pose(self.model, self.kept)
+            self.clicked, self.kept = read_points(self.session, self.frame), self._read_draft()
+        pose = read_draft_pose(self.model, self.kept)
         if pose is None:
             await self.solve()
         else:
@@ -137,12 +143,12 @@ class ClickPanel(PointsPanel):
             return
         with errors_shown():
             keep_start(self.session, start_from_pose(self.model, self.frame, self.hand.pose), what)
-            self.kept = self._drafted()
+            self.kept = self._read_draft()
         self.show_pose(says)
 
-    def _drafted(self) -> dict[str, Any] | None:
+    def _read_draft(self) -> dict[str, Any] | None:
         """Return the [start] that was made by hand in the frame in view, after its clicks."""
-        start = drafted_start(self.session)
+        start = read_draft_start(self.session)
         if start is None or start["frame"] != self.frame or not is_newer_than_clicks(self.session, start):
             return None
         return start
@@ -157,7 +163,7 @@ class ClickPanel(PointsPanel):
         """Show the clicks and the pose that are kept of the frame now: undo or another window may have changed them."""
         with errors_shown():
             clicked = read_points(self.session, self.frame)
-            if self._drafted() != self.kept:
+            if self._read_draft() != self.kept:
                 await self.show_frame()
             elif clicked.text(self.shown.names) != self.clicked.text(self.shown.names):
                 self.clicked = clicked
@@ -165,7 +171,11 @@ class ClickPanel(PointsPanel):
 
     async def solve(self) -> None:
         """Fit the body to the clicks, or say what is missing; the clicks are shown at once."""
-        self.is_by_hand, self.kept, self.says = False, self._drafted(), "fitting the body" if self.clicked.names else ""
+        self.is_by_hand, self.kept, self.says = (
+            False,
+            self._read_draft(),
+            "fitting the body" if self.clicked.names else "",
+        )
         self.show()
         if not self.clicked.names:
             return

@@ -88,7 +88,7 @@ class Correction:
         if command is None or self._before is None or not self._before.is_changed(self.folder):
             return describe_progress(0, 1)
         n_frames = count_frames(self.session.project().trial(), len(self.shown.clock))
-        return describe_progress(max(count_rows(self.folder)[0], command.counted()), n_frames)
+        return describe_progress(max(count_rows(self.folder)[0], command.n_done()), n_frames)
 
     async def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""

@@ -14,7 +14,7 @@ from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.layout import errors_shown
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import drafted_start, keep_start
+from airborne.studio.starts import keep_start, read_draft_start
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import CameraViews
 
@@ -48,18 +48,18 @@ class FindPlayersPanel:
                 self.controls.build()
                 self.use = ui.button(_USE, on_click=self.write).props("unelevated")
         self.use.set_visibility(False)
-        if (start := self._drafted()) is not None:
+        if (start := self._read_draft()) is not None:
             self.show_players(start)
 
     async def reread(self) -> None:
         """Show who is kept now, and say whether the trial has them: undo or another window may have changed it."""
-        if (kept := self._drafted()) != self.kept:
+        if (kept := self._read_draft()) != self.kept:
             self.controls.says = ""
             self.show_players(kept)
         self.controls.say()
 
-    def _drafted(self) -> dict[str, Any] | None:
-        start = drafted_start(self.session)
+    def _read_draft(self) -> dict[str, Any] | None:
+        start = read_draft_start(self.session)
         players = [] if start is None else start.get("player") or []
         return start if players and all("joints_m" in each for each in players) else None
 

@@ -17,10 +17,10 @@ from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import (
-    drafted_pose,
-    drafted_start,
     keep_start,
     pose_of,
+    read_draft_pose,
+    read_draft_start,
     read_pose,
     standing_pose,
     start_from_pose,
@@ -58,14 +58,14 @@ class FindPanel:
                 self.use = ui.button(_USE, on_click=self.write).props("unelevated")
                 with ui.element("div").classes("row-line tools"):
                     ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                    FitButton(self.session, self.hand, lambda: self.at, self.take_pose)
+                    FitButton(self.session, self.hand, frame_of=lambda: self.at, on_fit=self.take_pose)
                     self.stage = PoseStage(self.rig, self.hand, lambda: self.turn_to(self.frame), self.take_pose)
         await self.show_kept()
 
     async def show_kept(self) -> None:
         """Show the pose that was made here last, or the one that the trial has."""
-        self.found = drafted_start(self.session)
-        pose, stored = drafted_pose(self.model, self.found), read_pose(self.session, self.model)
+        self.found = read_draft_start(self.session)
+        pose, stored = read_draft_pose(self.model, self.found), read_pose(self.session, self.model)
         self.use.set_visibility(pose is not None)
         if self.found is not None and pose is not None:
             await self.draw(self.found["frame"], pose)
@@ -81,7 +81,7 @@ class FindPanel:
 
     async def reread(self) -> None:
         """Show what is kept now, and say whether the trial has it: undo or another window may have changed it."""
-        if drafted_start(self.session) != self.found:
+        if read_draft_start(self.session) != self.found:
             self.controls.says = ""
             self.controls.tell(None)
             await self.show_kept()

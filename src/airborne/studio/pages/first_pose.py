@@ -14,7 +14,7 @@ from airborne.studio.pages.find_players import FindPlayersPanel
 from airborne.studio.pages.find_pose import FindPanel
 from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
 from airborne.studio.session import Session
-from airborne.studio.starts import can_be_clicked, drafted_start
+from airborne.studio.starts import can_be_clicked, read_draft_start
 
 _HELP = "Choose the frame where tracking starts, and place the body there. Each later frame follows from it."
 _CLICK, _FIND = "Click the points", "Find automatically"
@@ -33,7 +33,7 @@ async def first_pose_page(session: Session) -> None:
         rig = await work("calibrating the cameras", session.rig)
         if shown is None or rig is None:
             return
-        start = drafted_start(session) or project.table("start")
+        start = read_draft_start(session) or project.table("start")
         frame = int(start.get("frame", session.frame))
         if project.table("body").get("preset") == "legs":
             players = PlayersPanel(session, shown, rig, frame)

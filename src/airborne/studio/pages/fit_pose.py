@@ -6,12 +6,12 @@ from collections.abc import Awaitable, Callable
 
 from nicegui import ui
 
-from airborne.studio.fitting import Fit, describe_fit, fit_to_frame
+from airborne.studio.fitting import FirstPoseFit, describe_quality, fit_to_frame
 from airborne.studio.outlines import BESIDE_COLOUR, outline_items
 from airborne.studio.pages.layout import complain, errors_shown, work
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.session import Session
-from airborne.studio.starts import drafted_start, keep_start, start_from_pose
+from airborne.studio.starts import keep_start, read_draft_start, start_from_pose
 
 _WHAT = "pose fitted to the pictures"  # of an undo
 
@@ -23,6 +23,7 @@ class FitButton:
         self,
         session: Session,
         hand: PoseHand,
+        *,
         frame_of: Callable[[], int],
         on_fit: Callable[[str, str], None],
         settle: Callable[[], Awaitable[None]] | None = None,
@@ -45,24 +46,24 @@ class FitButton:
             self._button.enable()
 
     async def _fit(self) -> None:
-        hand, before, frame, kept = self.hand, self.hand.pose, self._frame_of(), drafted_start(self.session)
+        hand, before, frame, kept = self.hand, self.hand.pose, self._frame_of(), read_draft_start(self.session)
         if before is None:
             complain("place the body by hand first, find it automatically, or click its landmarks")
             return
         fit = await work("fitting the body", lambda: fit_to_frame(self.session, hand.model, frame, before))
         if fit is None:
             return
-        says = f"Frame {frame} is fitted. {describe_fit(fit)}"
+        says = f"Frame {frame} is fitted. {describe_quality(fit)}"
         if hand.pose is before:
             hand.place(fit.pose)
             hand.before = outline_items(hand.model.with_pose(before), hand.cameras, BESIDE_COLOUR)
             self._on_fit(f"{says} The pose before is pink.", _WHAT)
-        elif self._frame_of() != frame and drafted_start(self.session) == kept:
+        elif self._frame_of() != frame and read_draft_start(self.session) == kept:
             self._keep(frame, fit, says)
         else:
             complain(f"the pose was changed while it was fitted in frame {frame}; press Fit again")
 
-    def _keep(self, frame: int, fit: Fit, says: str) -> None:
+    def _keep(self, frame: int, fit: FirstPoseFit, says: str) -> None:
         """Keep the fit of a frame that is no longer in view."""
         with errors_shown():
             keep_start(self.session, start_from_pose(self.hand.model, frame, fit.pose), _WHAT)

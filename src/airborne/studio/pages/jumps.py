@@ -68,6 +68,6 @@ class Jumps:
                 if not len(frames):
                     complain(f"in no frame of this run is anything {what}")
                     return
-                now = await self.view.wanted()
+                now = await self.view.latest_frame()
                 left = frames[frames < now][::-1] if is_back else frames[frames > now]
                 self.view.go(int(left[0] if len(left) else frames[-1 if is_back else 0]))

@@ -230,7 +230,7 @@ async def in_thread(function: Callable[..., _T], *arguments: object, says: str =
     except RuntimeError:  # it was closed while this waited for its turn
         raise asyncio.CancelledError from None
     try:
-        with _announced(client, says):
+        with _announce_late(client, says):
             return cast(_T, await run.io_bound(function, *arguments))
     finally:
         if client.id not in Client.instances or app.is_stopping:  # it would get None
@@ -238,7 +238,7 @@ async def in_thread(function: Callable[..., _T], *arguments: object, says: str =
 
 
 @contextmanager
-def _announced(client: Client, says: str) -> Iterator[None]:
+def _announce_late(client: Client, says: str) -> Iterator[None]:
     """Say on a page what goes on, once it has taken a tenth of a second."""
     notes: list[ui.notification] = []
 

@@ -136,14 +136,14 @@ class ThingPanel:
             shape.props("outlined dense options-dense").style("width: 130px")
         is_mesh = solid.shape not in ("box", "ellipsoid")
         if is_mesh:
-            value = _shown(solid.scale)
+            value = _or_nothing(solid.scale)
             unit = ui.number(LABELS["scale"], value=value, on_change=lambda e: self._number("scale", e))
             unit.props(f"outlined dense {_SOON}").style("width: 110px")
         for key in _FIELDS if not is_mesh else ("centre_mm", "turn_deg"):
             ui.label(LABELS[key]).classes("small soft")
             with ui.element("div").classes("row-line"):
                 for k, axis in enumerate("xyz"):
-                    value = _shown(getattr(solid, key)[k])
+                    value = _or_nothing(getattr(solid, key)[k])
                     number = ui.number(axis, value=value, on_change=lambda e, key=key, k=k: self._number(key, e, k))
                     number.props(f'outlined dense {_SOON} aria-label="{LABELS[key]} {axis}"').style("width: 84px")
         with ui.element("div").classes("row-line"):
@@ -181,6 +181,6 @@ class ThingPanel:
         self._choose(0)
 
 
-def _shown(value: float) -> float | None:
+def _or_nothing(value: float) -> float | None:
     """Return what a field shows of a number: nothing where it is missing."""
     return None if math.isnan(value) else value

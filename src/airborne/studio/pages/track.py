@@ -199,7 +199,7 @@ class _Panel:
                 self.curves = Curves(self._curves, frame=self.view.frame).style("height: 220px")
 
     def _say_progress(self, command: Command, n_rows: int) -> None:
-        n_frames, n_done, left = self.settings.n_frames, max(n_rows, command.counted()), ""
+        n_frames, n_done, left = self.settings.n_frames, max(n_rows, command.n_done()), ""
         if (n_own := n_done - self.n_before) > 2 and n_done < n_frames:
             left = f", about {command.seconds / n_own * (n_frames - n_done):.0f} s left"
         self.bar.value = n_done / max(n_frames, 1)

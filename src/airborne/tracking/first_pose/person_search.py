@@ -20,7 +20,7 @@ from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles, super_fibonacci
 from airborne.geometry.sampling import sobol_points
-from airborne.rendering import mask_evidence, uncovered_maps
+from airborne.rendering import mask_evidence, mask_out_surface
 from airborne.rendering.threads import in_threads
 from airborne.tracking.first_pose.colour_information import PixelColours, colour_classes
 from airborne.tracking.first_pose.moments import Moment
@@ -180,7 +180,7 @@ def _limb_coverage(person: JointedBody, limb: Limb, moved: PoseSet, silhouettes:
     def fill(part: slice) -> None:
         for i in range(part.start, part.stop):
             rows = slice(i * k, (i + 1) * k)
-            maps = uncovered_maps(limb.rest, silhouettes.maps, R[i * k], t[i * k])
+            maps = mask_out_surface(limb.rest, silhouettes.maps, R[i * k], t[i * k])
             out[i] = mask_evidence(limb.alone, maps, R[rows], t[rows]).sum(axis=1)
 
     in_threads(fill, len(out), THREADS)

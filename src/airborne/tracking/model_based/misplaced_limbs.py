@@ -17,7 +17,7 @@ from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.geometry.sampling import sobol_points
-from airborne.rendering import EvidenceMaps, mask_evidence, uncovered_maps
+from airborne.rendering import EvidenceMaps, mask_evidence, mask_out_surface
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -65,7 +65,7 @@ def search_limb(
     anywhere = np.concatenate([angles, _all_over(limits, joints, angles[0])])
     is_own = np.isin(np.arange(len(render_model.model.segments)), limb)
     posed = render_model.with_pose(poses[0])
-    left = uncovered_maps(surface_of_segments(render_model.geometry, ~is_own), maps, posed.R, posed.t)
+    left = mask_out_surface(surface_of_segments(render_model.geometry, ~is_own), maps, posed.R, posed.t)
     search = _LimbSearch(render_model.model, limb, surface_of_segments(render_model.geometry, is_own), root, left)
     angles = search.best(anywhere, _N_FIRST)
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
