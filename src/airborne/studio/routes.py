@@ -44,7 +44,7 @@ _EXAMPLES = Path(__file__).with_name("examples")  # pictures of each step, which
 _KEEP = {"cache-control": "private, max-age=3600"}
 
 
-class Wish(NamedTuple):
+class PictureQuery(NamedTuple):
     """How a picture is asked for."""
 
     shrink: int  # times smaller than the video
@@ -64,16 +64,16 @@ def add_routes(app: FastAPI, session: Session) -> None:
     @app.get("/image/{camera}/{frame}")
     async def image(request: Request, camera: int, frame: int, *, shrink: int = 1, near: bool = False) -> Response:
         async with _waiting(request) as is_wanted:
-            wish = Wish(shrink, near, is_wanted)
-            return await _answer(lambda: _jpeg(session, camera, frame, wish), _PREVIEWERS if near else _WORKERS)
+            query = PictureQuery(shrink, near, is_wanted)
+            return await _answer(lambda: _jpeg(session, camera, frame, query), _PREVIEWERS if near else _WORKERS)
 
     @app.get("/picture/{camera}/{number}")
     async def own_picture(
         request: Request, camera: int, number: int, *, shrink: int = 1, near: bool = False
     ) -> Response:
         async with _waiting(request) as is_wanted:
-            wish = Wish(shrink, near, is_wanted)
-            return await _answer(lambda: _picture(session, camera, number, wish), _PREVIEWERS if near else _WORKERS)
+            query = PictureQuery(shrink, near, is_wanted)
+            return await _answer(lambda: _picture(session, camera, number, query), _PREVIEWERS if near else _WORKERS)
 
     @app.get("/thumbnail/{name}")
     async def first_picture(name: str) -> Response:
@@ -182,24 +182,24 @@ def _mesh(model: BodyModel, part: int) -> Response:
     return Response(part_stl(model, part), media_type="model/stl", headers={"cache-control": "no-store"})
 
 
-def _jpeg(session: Session, camera: int, frame: int, wish: Wish) -> Response:
+def _jpeg(session: Session, camera: int, frame: int, query: PictureQuery) -> Response:
     shown = session.shown()
     if not (0 <= camera < len(shown.sources) and 0 <= frame < len(shown.clock)):
         return Response(status_code=404)
-    answer = _picture(session, camera, int(shown.clock.images[frame, camera]), wish)
+    answer = _picture(session, camera, int(shown.clock.images[frame, camera]), query)
     answer.headers["x-time-s"] = repr(float(shown.clock.times_s[frame]))
     return answer
 
 
-def _picture(session: Session, camera: int, number: int, wish: Wish) -> Response:
+def _picture(session: Session, camera: int, number: int, query: PictureQuery) -> Response:
     """Return a picture of a camera by its number in the file."""
     shown = session.shown()
-    if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera]) and wish.shrink in SHRINKS):
+    if not (0 <= camera < len(shown.sources) and number < len(shown.indexes[camera]) and query.shrink in SHRINKS):
         return Response(status_code=404)
-    if wish.is_near and number >= 0:
+    if query.is_near and number >= 0:
         number = shown.indexes[camera].key_before(number)
     source, make = shown.sources[camera], session.pictures.jpeg
-    jpeg = None if number < 0 else make(source, number, wish.shrink, wish.is_wanted, is_passing=wish.is_near)
+    jpeg = None if number < 0 else make(source, number, query.shrink, query.is_wanted, is_passing=query.is_near)
     if jpeg is None:
         return Response(status_code=204)  # this camera has no picture then
     return Response(jpeg, media_type="image/jpeg", headers=_KEEP)

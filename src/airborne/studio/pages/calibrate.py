@@ -27,7 +27,7 @@ from airborne.studio.calibrating import (
 from airborne.studio.commands import Command
 from airborne.studio.digitising import list_repetitions
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import errors_shown, show_findings
+from airborne.studio.pages.layout import show_errors, show_findings
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_videos
 from airborne.studio.session import Session
@@ -88,7 +88,7 @@ class CalibratePanel:
 
     def use_board(self) -> None:
         """Start the calibration with a board."""
-        with errors_shown():
+        with show_errors():
             if self.board.value is None:
                 raise AirborneError("describe the board first: columns, rows and the size of a square")
             media = {name: {"video": video} for name, video in self.videos.items()}
@@ -96,7 +96,7 @@ class CalibratePanel:
 
     def use_wand(self) -> None:
         """Start the calibration with a wand."""
-        with errors_shown():
+        with show_errors():
             length = {"length_m": float(self.length.value or 0)}
             folder, name = self.session.folder, str(self.wand.value)
             if name == _FILMED:
@@ -111,7 +111,7 @@ class CalibratePanel:
 
     def take(self, command: Command) -> None:
         """Use the calibration that was made."""
-        with errors_shown():
+        with show_errors():
             values = {"file": CALIBRATED, "control_points": None}
             self.session.set_table("calibration", values, f"calibration by {CALIBRATED}")
             write_report(self.session.folder, command.output())
@@ -144,7 +144,7 @@ class CalibratePanel:
 
             def write() -> None:
                 columns, rows, square_mm, marker_mm = (float(each.value or 0) for each in numbers)
-                with errors_shown():
+                with show_errors():
                     more = {"marker_mm": marker_mm, "dictionary": str(dictionary.value)}
                     text = board_text(int(columns), int(rows), square_mm, **more)
                     self.session.edit(_BOARD, text, "board described")
@@ -158,7 +158,7 @@ class CalibratePanel:
         """Show what the last calibration said, and where each camera saw points."""
         if text := read_report(self.session.folder):
             ui.label(text).classes("report")
-        with errors_shown():
+        with show_errors():
             findings = read_findings(self.session.folder, CALIBRATED)
             show_findings(findings.get("", []))
             if pictures := list_pictures(self.session.folder):

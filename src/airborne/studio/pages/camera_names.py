@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from nicegui import ui
 
 from airborne.studio.calibrations import guess_name
-from airborne.studio.pages.layout import complain, errors_shown
+from airborne.studio.pages.layout import complain, show_errors
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_cameras, with_table
 
@@ -59,7 +59,7 @@ def use_calibration(session: Session, table: dict[str, str | None], names: dict[
         {"video": each.video, "calibrated_as": name if (name := names.get(each.name)) != each.name else None}
         for each in session.project().cameras
     ]
-    with errors_shown():
+    with show_errors():
         session.edit_trial(
             lambda text: with_table(with_cameras(text, session.path.stem, cameras), "calibration", table),
             f"calibration by {table['file'] or table['control_points']}",

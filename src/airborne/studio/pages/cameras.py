@@ -20,11 +20,11 @@ from airborne.studio.pages.calibrate import CalibratePanel
 from airborne.studio.pages.camera_names import CameraNames, use_calibration
 from airborne.studio.pages.control_points import ControlPointsPanel
 from airborne.studio.pages.layout import (
-    errors_shown,
     in_thread,
     name_missing_steps,
     name_outer_links,
     page_frame,
+    show_errors,
     show_findings,
     work,
 )
@@ -152,7 +152,7 @@ def _chooser(
         await on_use()
 
     async def use_court(net: Net) -> None:
-        with errors_shown():
+        with show_errors():
             if not (session.folder / _court_file(net)).exists():
                 session.edit(_court_file(net), court_text(net), "points of a court")
             await use("control_points", _court_file(net))
@@ -189,7 +189,7 @@ def _show_refused(session: Session, files: Calibrations) -> None:
 def _findings_of(session: Session, file: str) -> dict[str, list[str]]:
     """Return what the diagnosis of a calibration found, by the trial's own cameras; "" holds what concerns all."""
     found: dict[str, list[str]] = {}
-    with errors_shown():
+    with show_errors():
         found = read_findings(session.folder, file)
     own = {each.name: found.get(each.calibrated_as or each.name, []) for each in session.project().cameras}
     return {"": found.get("", []), **own}
@@ -198,7 +198,7 @@ def _findings_of(session: Session, file: str) -> dict[str, list[str]]:
 def _deviations_of(session: Session, file: str) -> dict[str, dict[str, float]]:
     """Return the standard deviations that a calibration's report knows, by the trial's own cameras."""
     known: dict[str, dict[str, float]] = {}
-    with errors_shown():
+    with show_errors():
         known = read_deviations(session.folder, file)
     return {each.name: known.get(each.calibrated_as or each.name, {}) for each in session.project().cameras}
 

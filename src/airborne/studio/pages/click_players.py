@@ -16,7 +16,7 @@ from airborne.errors import AirborneError, count
 from airborne.io.names import check_column
 from airborne.studio.clicks import Clicked
 from airborne.studio.outlines import legs_items, player_colours
-from airborne.studio.pages.layout import complain, errors_shown, in_thread
+from airborne.studio.pages.layout import complain, in_thread, show_errors
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -88,7 +88,7 @@ class PlayersPanel(PointsPanel):
 
     async def reread(self) -> None:
         """Show the clicks that the tables hold now."""
-        with errors_shown():
+        with show_errors():
             self.players = read_players(self.session.folder, self.frame)
             self.players.setdefault(self.player, Clicked((), None, {}))
             self.clicked = self.players[self.player]
@@ -127,7 +127,7 @@ class PlayersPanel(PointsPanel):
         """Write the players into the trial."""
         files = {name: player_file(name, self.frame) for name in self.players if self._is_ready(name)}
         unready = [name for name, clicked in self.players.items() if name not in files and clicked.names]
-        with errors_shown():
+        with show_errors():
             if not files or unready:
                 missing = unready or list(self.players)
                 raise AirborneError(

@@ -13,7 +13,7 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.studio.clicks import Clicked
 from airborne.studio.pages.fit_pose import FitButton
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import show_errors
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, PointsPanel
 from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
@@ -106,7 +106,7 @@ class ClickPanel(PointsPanel):
         self.frame = self.view.frame
         self.selected, self.outline, self.says, self.is_by_hand = None, [], "", False
         self.clicked = Clicked((), None, {})
-        with errors_shown():
+        with show_errors():
             self.clicked, self.kept = read_points(self.session, self.frame), self._read_draft()
         pose = read_draft_pose(self.model, self.kept)
         if pose is None:
@@ -141,7 +141,7 @@ class ClickPanel(PointsPanel):
         """Keep the pose that the hand holds, and show it; it is not fitted to the clicks."""
         if self.hand.pose is None:
             return
-        with errors_shown():
+        with show_errors():
             keep_start(self.session, start_from_pose(self.model, self.frame, self.hand.pose), what)
             self.kept = self._read_draft()
         self.show_pose(says)
@@ -161,7 +161,7 @@ class ClickPanel(PointsPanel):
 
     async def reread(self) -> None:
         """Show the clicks and the pose that are kept of the frame now: undo or another window may have changed them."""
-        with errors_shown():
+        with show_errors():
             clicked = read_points(self.session, self.frame)
             if self._read_draft() != self.kept:
                 await self.show_frame()
@@ -192,7 +192,7 @@ class ClickPanel(PointsPanel):
         start: dict[str, Any] = {"frame": self.frame, "points_px": self.file}
         if self.is_by_hand and self.hand.pose is not None:
             start = start_from_pose(self.model, self.frame, self.hand.pose)
-        with errors_shown():
+        with show_errors():
             write_start(self.session, start)
             ui.notify("the first pose is written into the trial", type="positive")
 

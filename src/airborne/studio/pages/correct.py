@@ -16,7 +16,7 @@ from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.ghosts import ghost_of
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import errors_shown, in_thread
+from airborne.studio.pages.layout import in_thread, show_errors
 from airborne.studio.pages.mask_cameras import MaskPanel
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.pages.run_watch import RunWatch
@@ -76,7 +76,7 @@ class Correction:
     def _find_untracked(self) -> None:
         """Offer to track again where the trial has corrections that the run has not been tracked with."""
         project = self.session.project()
-        with errors_shown():
+        with show_errors():
             if not project.mistake and project.table("start") and lacks_corrections(project.trial(), self.folder):
                 self._tracked = None
                 self.watch.says.set_text("the trial has corrections that this run was tracked without")
@@ -94,7 +94,7 @@ class Correction:
         """Show the body of a frame and its joints, to be grabbed."""
         if self.view is None:
             return
-        with errors_shown():
+        with show_errors():
             pose, self.hand.colour, hint = self._pose(frame) if self.switch.value else (None, POSE_COLOUR, "")
             await self.hand.place_next(pose)
             self.hint.set_text(hint)
@@ -189,7 +189,7 @@ class Correction:
         )
 
     def _edit(self, frame: int, change: Callable[[str], str], what: str, sd: str) -> None:
-        with errors_shown():
+        with show_errors():
             trial = self.session.project().trial()
             if frame <= trial.start.frame:
                 raise TrialError(f"frame {trial.start.frame} is the start; correct it in the step First pose")
@@ -208,7 +208,7 @@ class Correction:
     def track(self) -> None:
         """Track again what the corrections touch, as `airborne track --resume` does."""
         self._asked = self._held()
-        with errors_shown():
+        with show_errors():
             self._before = RunBefore.of(self.folder)
         self.watch.start("track", self.session.path.name, "-o", self.folder.name, "--resume")
 
@@ -220,7 +220,7 @@ class Correction:
         self._tracked = self._asked
         self.again.set_visibility(self._held() != self._tracked)
         before, text = self._before, "tracked again"
-        with errors_shown():
+        with show_errors():
             if before is not None:
                 trial = self.session.project().trial()
                 text = await in_thread(describe_tracked_again, before, self.folder, trial, says="reading the run")

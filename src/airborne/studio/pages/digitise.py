@@ -27,7 +27,7 @@ from airborne.studio.digitising import (
     without_point,
 )
 from airborne.studio.pages.compare_clicks import ClickComparison
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
+from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -56,7 +56,7 @@ async def digitise_page(session: Session) -> None:
             model = await in_thread(session.project().model, says="reading the body")
         except AirborneError:  # points can be digitised before there is a body
             model = None
-        with errors_shown():
+        with show_errors():
             panel = DigitisePanel(session, shown, model)
             changed.append(panel.reread)
             panel.build()
@@ -139,7 +139,7 @@ class DigitisePanel(PointsPanel):
 
     async def reread(self) -> None:
         """Show the clicks that the table holds now: undo or another window may have changed it."""
-        with errors_shown():
+        with show_errors():
             extra, self.extra = self.extra, self._kept()
             table = self._read()
             cameras = self.shown.names
@@ -171,7 +171,7 @@ class DigitisePanel(PointsPanel):
 
     async def change_who(self, operator: str, number: float | None) -> None:
         """Digitise as somebody else, or once more."""
-        with errors_shown():
+        with show_errors():
             self.who = parse_repetition(operator, number)
             self.table, self.selected = self._read(), None
             self.clicked = self._of_frame()
@@ -179,7 +179,7 @@ class DigitisePanel(PointsPanel):
 
     async def set_help(self, is_on: bool) -> None:
         """Show the epipolar curves of the chosen point's clicks, or no more; that it was on is noted for good."""
-        with errors_shown():
+        with show_errors():
             self.rig = await in_thread(self.session.rig, says="calibrating the cameras") if is_on else None
             if is_on:
                 self.session.edit(self.who.record, record_text(self.who), "epipolar help used")
@@ -194,7 +194,7 @@ class DigitisePanel(PointsPanel):
         if name in self.names:
             complain(f"{name} is among the points already; it is chosen now")
         else:
-            with errors_shown():
+            with show_errors():
                 self.session.keep_draft(_DRAFT, [*self.extra, name], f"{name} added to the points")
                 self.extra = self._kept()
         self.table = add_points(self.table, [name])
@@ -211,7 +211,7 @@ class DigitisePanel(PointsPanel):
         elif len(self.names) == 1 and len(self.table.index):
             complain(f"{name} is the only point of {self.file}; add another first")
         else:
-            with errors_shown():
+            with show_errors():
                 left = without_point(self.table, name)
                 if len(left.index):
                     self.session.edit(self.file, format_clicked_frames(left, cameras), f"{name} dropped")

@@ -11,7 +11,7 @@ from airborne.cameras import Rig
 from airborne.errors import count
 from airborne.studio.outlines import legs_items, player_colours
 from airborne.studio.pages.find_controls import FindControls
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import keep_start, read_draft_start
@@ -78,7 +78,7 @@ class FindPlayersPanel:
         players = each.get("player") or each["players"]
         players = [{"name": player["name"], "joints_m": player["joints_m"]} for player in players]
         start = {"frame": int(each["frame"]), "player": players}
-        with errors_shown():
+        with show_errors():
             keep_start(self.session, start, "players found")
         self.show_players(start)
 
@@ -96,7 +96,7 @@ class FindPlayersPanel:
     def write(self) -> None:
         """Write the players into the trial."""
         players = {name: {"joints_m": joints_m} for name, joints_m in self.joints_m.items()}
-        with errors_shown():
+        with show_errors():
             self.session.edit_trial(
                 lambda text: with_players(text, self.at, players), f"{count(len(players), 'player')} set"
             )

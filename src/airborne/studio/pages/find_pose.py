@@ -11,7 +11,7 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.fit_pose import FitButton
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import show_errors
 from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
 from airborne.studio.pictures import ShownTrial
@@ -109,7 +109,7 @@ class FindPanel:
         """Keep the pose that the hand holds, and show it, ready to be used."""
         if self.hand.pose is not None:
             self.found = start_from_pose(self.model, self.at, self.hand.pose)
-            with errors_shown():
+            with show_errors():
                 keep_start(self.session, self.found, what)
             self.use.set_visibility(True)
             self.turn_to(self.frame)
@@ -119,7 +119,7 @@ class FindPanel:
     async def show_found(self, each: dict[str, Any]) -> None:
         """Show a pose that was found, ready to be used."""
         self.found = {key: each[key] for key in _START if key in each}
-        with errors_shown():
+        with show_errors():
             keep_start(self.session, self.found, "pose found")
         self.use.set_visibility(True)
         await self.draw(int(each["frame"]), pose_of(self.model, each))
@@ -135,6 +135,6 @@ class FindPanel:
     def write(self) -> None:
         """Write the pose that was found into the trial."""
         if self.found is not None:
-            with errors_shown():
+            with show_errors():
                 write_start(self.session, self.found)
                 ui.notify("the first pose is written into the trial", type="positive")

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from airborne.studio.fitting import FirstPoseFit, describe_quality, fit_to_frame
 from airborne.studio.outlines import BESIDE_COLOUR, outline_items
-from airborne.studio.pages.layout import complain, errors_shown, work
+from airborne.studio.pages.layout import complain, show_errors, work
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.session import Session
 from airborne.studio.starts import keep_start, read_draft_start, start_from_pose
@@ -65,6 +65,6 @@ class FitButton:
 
     def _keep(self, frame: int, fit: FirstPoseFit, says: str) -> None:
         """Keep the fit of a frame that is no longer in view."""
-        with errors_shown():
+        with show_errors():
             keep_start(self.session, start_from_pose(self.hand.model, frame, fit.pose), _WHAT)
             ui.notify(f"{says} Go back to frame {frame} to see it.", multi_line=True)

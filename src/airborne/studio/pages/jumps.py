@@ -10,7 +10,7 @@ from pathlib import Path
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
-from airborne.studio.pages.layout import complain, errors_shown, in_thread
+from airborne.studio.pages.layout import complain, in_thread, show_errors
 from airborne.studio.strips import doubtful_frames
 from airborne.studio.view import CameraViews
 
@@ -46,7 +46,7 @@ class Jumps:
         """Say how many such frames the run has now."""
         if (run := self._run) is None:
             return
-        with errors_shown():
+        with show_errors():
             found = await in_thread(doubtful_frames, run, says="reading the run")
             for what, frames in found.items() if run == self._run else ():
                 self._buttons[what].set_enabled(len(frames) > 0)
@@ -63,7 +63,7 @@ class Jumps:
         async with self._one_at_a_time:
             if self._run is None or self.view is None:
                 return
-            with errors_shown():
+            with show_errors():
                 frames = (await in_thread(doubtful_frames, self._run, says="reading the run"))[what]
                 if not len(frames):
                     complain(f"in no frame of this run is anything {what}")

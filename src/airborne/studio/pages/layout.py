@@ -76,13 +76,13 @@ async def page_frame(
     sheet, example, known = _sheet(), _example(here), [session.stamp]
 
     async def move(verb: str) -> None:
-        with errors_shown():
+        with show_errors():
             what = session.editor.undo() if verb == "undo" else session.editor.redo()
             ui.notify(f"{'undone' if verb == 'undo' else 'redone'}: {what}")
             await look()
 
     async def look() -> None:
-        with errors_shown():
+        with show_errors():
             session.editor.settle()
         for button, tip, what in ((undo, undo_tip, session.editor.last), (redo, redo_tip, session.editor.next)):
             button.set_enabled(what is not None)
@@ -205,7 +205,7 @@ def show_findings(sentences: Iterable[str]) -> None:
 
 
 @contextmanager
-def errors_shown() -> Iterator[None]:
+def show_errors() -> Iterator[None]:
     """Show a user's error as a line on the page."""
     try:
         yield
@@ -280,6 +280,6 @@ class Latest:
 
 async def work(what: str, function: Callable[[], _T]) -> _T | None:
     """Do something slow in a thread, saying what; None where it ends in an error, which is shown."""
-    with errors_shown():
+    with show_errors():
         return await in_thread(function, says=what)
     return None

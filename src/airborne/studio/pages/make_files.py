@@ -11,7 +11,7 @@ from airborne.motion.run_folder import FOLDERS
 from airborne.run.export import EXPORT_FORMATS
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import show_errors
 from airborne.studio.session import Session
 
 
@@ -39,7 +39,7 @@ class Making:
     def export(self) -> None:
         """Start `airborne export`."""
         self._watch.words = "exporting"
-        with errors_shown():
+        with show_errors():
             self._watch.start("export", self._folder.name, *(f"--{kind}" for kind in self._formats.value))
 
     def film(self) -> None:

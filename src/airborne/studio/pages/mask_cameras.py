@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from airborne.errors import TrialError
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_mask, without_mask
@@ -61,14 +61,14 @@ class MaskPanel:
         numbers = (self.first.value, self.last.value)
         first, last = (self._frame_of() if number is None else int(number) for number in numbers)
         camera = str(self.camera.value)
-        with errors_shown():
+        with show_errors():
             last, note = clip_frames(first, last, self._end)
             what = f"{camera} left out of frames {first} to {last}{note}"
             self._edit(lambda text: with_mask(text, camera, first, last), what)
 
     def remove(self, number: int, camera: str) -> None:
         """Use a camera again."""
-        with errors_shown():
+        with show_errors():
             self._edit(lambda text: without_mask(text, number), f"{camera} used again")
 
     def _edit(self, change: Callable[[str], str], what: str) -> None:

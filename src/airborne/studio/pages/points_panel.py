@@ -12,7 +12,7 @@ from nicegui.events import KeyEventArguments
 from airborne.cameras import Rig
 from airborne.cameras.epipolar import epipolar_curve
 from airborne.studio.clicks import Clicked
-from airborne.studio.pages.layout import Latest, complain, errors_shown
+from airborne.studio.pages.layout import Latest, complain, show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Drag, Item
@@ -122,7 +122,7 @@ class PointsPanel:
 
     async def save(self, clicked: Clicked, what: str) -> None:
         """Write the table, and what follows from it."""
-        with errors_shown():
+        with show_errors():
             self.session.edit(self.file, self.text(clicked), what)
             self.clicked = clicked
         await self.solve()

@@ -18,7 +18,7 @@ from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR, leg_rods, player_colours, sides_m
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.jumps import Jumps
-from airborne.studio.pages.layout import errors_shown, in_thread, page_frame, work
+from airborne.studio.pages.layout import in_thread, page_frame, show_errors, work
 from airborne.studio.pages.mask_cameras import PlayersMasks
 from airborne.studio.pages.run_watch import RunWatch
 from airborne.studio.pictures import ShownTrial
@@ -125,14 +125,14 @@ async def _show_run(
 
     async def turn_to(frame: int) -> None:
         session.go(frame=frame)
-        with errors_shown():
+        with show_errors():
             for show in bodies:
                 if isawaitable(result := show(frame)):
                     await result
 
     query = f"?beside={quote(beside)}" if beside else ""
     if beside:
-        with ui.element("div").classes("row-line small"), errors_shown():
+        with ui.element("div").classes("row-line small"), show_errors():
             ui.element("span").style(f"width: 16px; border-top: 3px solid {BESIDE_COLOUR}")
             ui.label(beside).classes("name")
             ui.label(
@@ -168,7 +168,7 @@ async def _show_run(
 
 async def _show_alarms(folder: Path) -> None:
     """Show what the self-check of a finished run found wrong."""
-    with errors_shown():
+    with show_errors():
         summary = await in_thread(read_summary, folder, says="reading the run") if (folder / SUMMARY).is_file() else {}
         for finding in summary.get("self_check") or []:
             if finding["is_alarm"]:
@@ -226,7 +226,7 @@ class MomentumArrow:
 
     async def read(self) -> None:
         """Read the run's table, and show what it says of the frame in view."""
-        with errors_shown():
+        with show_errors():
             self._momenta = await in_thread(run_momenta, self._folder, says="reading the run")
             self.show(self._view.frame)
 

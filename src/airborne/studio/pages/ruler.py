@@ -11,7 +11,7 @@ from nicegui import ui
 
 from airborne.cameras import Rig
 from airborne.studio.clicks import Clicked, measure_between, read_clicked
-from airborne.studio.pages.layout import errors_shown, name_missing_steps, page_frame, work
+from airborne.studio.pages.layout import name_missing_steps, page_frame, show_errors, work
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, CLICK_SD_PX, PointsPanel
 from airborne.studio.pictures import ShownTrial
@@ -72,7 +72,7 @@ class RulerPanel(PointsPanel):
 
     async def reread(self) -> None:
         """Show the clicks that the table holds now."""
-        with errors_shown():
+        with show_errors():
             path = self.session.file(_FILE)
             self.clicked = read_clicked(path) if path.is_file() else Clicked((), None, {})
             self.show()

@@ -11,7 +11,7 @@ from nicegui.events import KeyEventArguments
 from airborne.errors import count
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import errors_shown, page_frame, work
+from airborne.studio.pages.layout import page_frame, show_errors, work
 from airborne.studio.pages.points_panel import CAMERA_COLOURS
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
@@ -112,7 +112,7 @@ class _Panel:
         self.show()
 
     def _keep(self, events: list[tuple[int, int]], what: str) -> None:
-        with errors_shown():
+        with show_errors():
             known = self.session.draft(_DRAFT)
             known = known if isinstance(known, dict) else {}
             self.session.keep_draft(_DRAFT, {**known, self._both: events}, f"{what}, {self.shown.names[self.other]}")
@@ -142,7 +142,7 @@ class _Panel:
         table = self.session.project().cameras[self.other]
         cameras: list[dict[str, object]] = [{"video": each.video} for each in self.session.project().cameras]
         cameras[self.other] |= {"offset_s": round(offset_s, 6), "offset_sd_s": round(sd_s, 6)}
-        with errors_shown():
+        with show_errors():
             what = f"offset of {table.name}: {1e3 * offset_s:+.1f} ms"
             self.session.edit_trial(lambda text: with_cameras(text, self.session.folder.name, cameras), what)
             ui.notify(f"written: {what}", type="positive")

@@ -10,7 +10,7 @@ from nicegui import ui
 from airborne.errors import AirborneError
 from airborne.studio.folder import files_inside
 from airborne.studio.pages.body import save_body
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
+from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.things import LABELS, MESHES, Solid, check_thing, colour_at, parse_thing, thing_text
@@ -69,7 +69,7 @@ class ThingPanel:
     async def take_colour(self, pane: int, u: float, v: float, near: str | None) -> None:
         """Give the chosen solid the colour that a picture has there."""
         number = int(self.shown.clock.images[self.view.frame, pane])
-        with errors_shown():
+        with show_errors():
             image = await in_thread(self.session.pictures.image, self.shown.sources[pane], number, says="decoding")
             if image is not None:
                 self.change(colour=colour_at(image, u, v))
@@ -85,7 +85,7 @@ class ThingPanel:
         text = thing_text(self.name or "thing", self.solids)
         if text != self.text:
             self.text = text
-            with errors_shown():
+            with show_errors():
                 over = read_if_there(self.session.file(_FILE))
                 self.session.keep_draft(_DRAFT, {"text": text, "over": over}, what)
 
@@ -100,7 +100,7 @@ class ThingPanel:
     def _kept(self) -> str:
         """Return the draft, unless the thing's file was changed elsewhere since; without both, a box."""
         draft, text = self.session.draft(_DRAFT), None
-        with errors_shown():
+        with show_errors():
             text = read_if_there(self.session.file(_FILE))
         if isinstance(draft, dict) and isinstance(draft.get("text"), str) and draft.get("over") == text:
             return draft["text"]
@@ -108,7 +108,7 @@ class ThingPanel:
 
     def _read(self) -> None:
         """Describe what the text holds; one that is more than solids in one piece is left alone."""
-        with errors_shown():
+        with show_errors():
             self.name, self.solids = parse_thing(self.text, _FILE)
 
     async def write(self) -> None:
@@ -116,7 +116,7 @@ class ThingPanel:
         name, solids = self.name or "thing", list(self.solids)
         text = await work("reading the thing", lambda: check_thing(self.session.folder, _FILE, name, solids))
         if text is not None:
-            with errors_shown():
+            with show_errors():
                 self.session.edit(_FILE, text, "thing described")
                 save_body(self.session, {"file": _FILE})
 

@@ -11,7 +11,7 @@ from nicegui import ui
 from airborne.errors import STOPPED, AirborneError, TrialError, count
 from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY
 from airborne.studio.commands import Command
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_missing_steps, page_frame, work
+from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
 from airborne.studio.pages.track_settings import TrackSettingsBar
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import find_run, list_runs
@@ -130,7 +130,7 @@ class _Panel:
         """Start `airborne track`."""
         if self._is_running:
             return
-        with errors_shown():
+        with show_errors():
             self.session.project().trial()
             words = ["track", self.session.path.name, "-o", self.folder.name, *options]
             self.n_before = self._count()[0] if "--resume" in options else 0

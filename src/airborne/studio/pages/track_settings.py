@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from airborne.errors import TrialError
-from airborne.studio.pages.layout import errors_shown
+from airborne.studio.pages.layout import show_errors
 from airborne.studio.runs import count_frames
 from airborne.studio.session import Session
 from airborne.trial.settings import BODY_METHODS, PLAYERS_METHODS
@@ -37,7 +37,7 @@ class TrackSettingsBar:
 
     def reread(self) -> None:
         """Show what the trial has now."""
-        with errors_shown():
+        with show_errors():
             self._trial = self._session.project().trial()
             self._show()
 
@@ -54,7 +54,7 @@ class TrackSettingsBar:
     def _set_last(self) -> None:
         value, frame = self._last.value, self._trial.start.frame
         last = self._n_images - 1 if value is None else int(value)
-        with errors_shown():
+        with show_errors():
             if last < frame:
                 raise TrialError(f"the first pose is that of frame {frame}; give a last frame from there on")
             stop = last + 1 if last + 1 < self._n_images else None
@@ -63,6 +63,6 @@ class TrackSettingsBar:
         self._show()
 
     def _set(self, key: str, value: object, what: str) -> None:
-        with errors_shown():
+        with show_errors():
             self._session.set_table("track", {key: value}, what)
         self.reread()

@@ -12,7 +12,7 @@ from airborne.errors import AirborneError, count
 from airborne.io.names import check_name
 from airborne.studio.field_order import ORDERS
 from airborne.studio.folder import outer_files
-from airborne.studio.pages.layout import complain, errors_shown, in_thread, name_outer_links, page_frame
+from airborne.studio.pages.layout import complain, in_thread, name_outer_links, page_frame, show_errors
 from airborne.studio.project import VIDEO_ENDINGS, Project, list_videos
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_cameras
@@ -168,7 +168,7 @@ def _save(session: Session, choices: list[_Choice]) -> None:
         }
         for choice in chosen
     ]
-    with errors_shown():
+    with show_errors():
         session.edit_trial(
             lambda text: with_cameras(text, session.folder.name, tables), f"{count(len(chosen), 'camera')} chosen"
         )
