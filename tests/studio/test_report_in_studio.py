@@ -91,7 +91,7 @@ def folder(tmp_path_factory):
     run, players = folder / "results", folder / "players"
     for each, file in ((run, MOTION), (players, JOINTS)):
         each.mkdir(parents=True)
-        (each / file).write_text("frame\n")
+        (each / file).write_text("frame\n0\n")  # a run has a frame
     motion = person_run()
     film = Film(videos_of(run) / PICTURES, ["left", "right"])
     for frame in motion.index.tolist():
