@@ -78,7 +78,7 @@ def files(tmp_path):
     (files / "digitised_A_1.csv").write_text("frame,point,cam1_u,cam1_v\n0,a,1,2\n")
     (files / "start_points_3.csv").write_text("point,cam1_u,cam1_v\nhip,1,2\n")
     (files / "start_anna_3.csv").write_text("point,cam1_u,cam1_v\nhip,1,2\n")
-    (files / "results" / "motion.csv").write_text("nothing\n")
+    (files / "results" / "motion.csv").write_text("frame\n0\n")
     (files / "results" / "tables" / "angles.csv").write_text("nothing\n")
     (files / REPORT / "residuals_cam1.png").write_bytes(b"")
     camera = camera_looking_at("cam1", [3.0, 0, 1], [0, 0, 1], focal_px=600, size=(640, 480))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -126,8 +127,8 @@ def list_measurements(folder: Path) -> list[str]:
 
 
 def list_runs(folder: Path) -> list[Path]:
-    """List the folders of runs, the newest first, without those that hold a link which leads out of the folder."""
-    runs = [path for path in folder.iterdir() if _is_run(path) and not outer_links(folder, path)]
+    """List the folders of runs with a frame, the newest first; none that holds a link which leads out of the folder."""
+    runs = [path for path in folder.iterdir() if _is_run(path) and not outer_links(folder, path) and _has_frame(path)]
     return sorted(runs, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
@@ -144,16 +145,16 @@ def find_run(folder: Path, name: str) -> Path | None:
 
 def _is_run(path: Path) -> bool:
     is_folder = path.is_dir() and path.name != FOLDER and not path.is_symlink()
-    return is_folder and any(_holds_a_row(path / name) for name in (MOTION, JOINTS))
+    return is_folder and any((path / name).is_file() for name in (MOTION, JOINTS))
 
 
-def _holds_a_row(table: Path) -> bool:
-    """Say whether a table has a whole row below its header: the first frame has been tracked."""
-    try:
-        with table.open("rb") as lines:
-            return bool(lines.readline()) and lines.readline().endswith(b"\n")
-    except OSError:
-        return False
+def _has_frame(run: Path) -> bool:
+    """Say whether a table of a run has a whole row below its header: its first frame has been tracked."""
+    for name in (MOTION, JOINTS):
+        with suppress(OSError), (run / name).open("rb") as lines:
+            if lines.readline() and lines.readline().endswith(b"\n"):
+                return True
+    return False
 
 
 @dataclass(frozen=True, slots=True)
