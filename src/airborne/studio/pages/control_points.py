@@ -176,10 +176,10 @@ class ControlPointsPanel(PointsPanel):
 
     def _list_state(self) -> None:
         for camera in self.shown.names:
-            fit = self.fits.get(camera, (b"", ""))[1]
+            fit, model = self.fits.get(camera, (b"", ""))[1], ""
             n = count_clicked(self.clicked, camera)
             if isinstance(fit, Calibration):
-                text, tone = f"{n} points, residual {fit.fits[0].rms_px:.2f} px RMS ({fit.fits[0].model})", "soft"
+                text, tone, model = f"{n} points, residual {fit.fits[0].rms_px:.2f} px RMS", "soft", fit.fits[0].model
             elif fit:
                 text, tone = fit, "bad"
             elif n >= FEWEST_POINTS:
@@ -189,7 +189,7 @@ class ControlPointsPanel(PointsPanel):
             with ui.element("div"):
                 with ui.element("div").classes("row-line tools"):
                     ui.label(camera).classes("name")
-                    ui.label(text).classes(f"{tone} small")
+                    ui.label(text).classes(f"{tone} small").tooltip(model)
                 show_findings(each.sentence for each in self._findings(camera) if not each.points)
 
     def _findings(self, camera: str) -> tuple[Finding, ...]:

@@ -28,7 +28,7 @@ class PointList:
         self._card = (
             ui.element("div")
             .classes("card points")
-            .style(f"--n: {width}px; flex: 1; min-height: 120px; overflow-y: auto")
+            .style(f"--n: {width}px; flex: 1; min-height: 160px; overflow-y: auto")
         )
         self._build(())
 
