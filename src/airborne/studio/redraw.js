@@ -9,7 +9,9 @@ const LEAST_SHARE = 0.05; // of the time in which it is drawn nonetheless, where
 
 export default class Redraw {
   create_mesh(scene_id) {
-    const { renderer } = getElement(scene_id), draw = renderer.render.bind(renderer); // the scene is NiceGUI's
+    const renderer = getElement(scene_id)?.renderer; // the scene is NiceGUI's; it is gone where the page was laid out anew
+    if (!renderer) return new THREE.Group();
+    const draw = renderer.render.bind(renderer);
     let drawn = [], took = 0, ended = -Infinity, stepped = -Infinity;
     const step = () => (stepped = performance.now());
     for (const name of ["airborne-frame", "airborne-shown"]) window.addEventListener(name, step);

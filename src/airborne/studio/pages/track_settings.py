@@ -31,15 +31,18 @@ class TrackSettingsBar:
         self._method.props("outlined dense options-dense").style("min-width: 140px")
         self._last = ui.number("last frame", min=0, max=self._n_images - 1, precision=0)
         self._last.props("outlined dense clearable").style("width: 120px")
-        self._last.on("change", self._set_last, args=[]).on("clear", self._set_last, args=[])
+        # the text is sent along: the field may have been set anew since it was typed
+        self._last.on("change", lambda event: self._set_last(str(event.args)))
+        self._last.on("clear", lambda: self._set_last(""), args=[])
         self._first = ui.label().classes("small soft")
         self._show()
 
     def reread(self) -> None:
-        """Show what the trial has now."""
+        """Show what the trial has now; where that has not changed, what is being typed stays."""
         with show_errors():
-            self._trial = self._session.project().trial()
-            self._show()
+            before, self._trial = self._trial, self._session.project().trial()
+            if (self._trial.track, self._trial.start) != (before.track, before.start):
+                self._show()
 
     def _show(self) -> None:
         track, frame = self._trial.track, self._trial.start.frame
@@ -51,9 +54,8 @@ class TrackSettingsBar:
         if self._method.value != self._trial.track.method:
             self._set("method", self._method.value, f"method {self._method.value}")
 
-    def _set_last(self) -> None:
-        value, frame = self._last.value, self._trial.start.frame
-        last = self._n_images - 1 if value is None else int(value)
+    def _set_last(self, text: str) -> None:
+        frame, last = self._trial.start.frame, int(float(text)) if text else self._n_images - 1
         with show_errors():
             if last < frame:
                 raise TrialError(f"the first pose is that of frame {frame}; give a last frame from there on")
