@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from airborne.cameras.finding import join_names
 from airborne.errors import count
 
 _FITTED = "by fitting a coloured three-dimensional model of the body to the images of all cameras, frame by frame"
@@ -60,13 +61,13 @@ def describe_corrections(summary: Mapping[str, Any]) -> list[str]:
         by_form: dict[str, list[str]] = {}
         for key in keys:
             by_form.setdefault(_forms(key), []).append(str(key["frame"]))
-        groups = ", ".join(f"{_join_words(frames)} ({form})" for form, frames in by_form.items())
+        groups = ", ".join(f"{join_names(frames)} ({form})" for form, frames in by_form.items())
         text.append(f"The pose was corrected in {count(len(keys), 'frame')}: {groups}.")
     stretches: dict[str, list[str]] = {}
     for mask in masks:
         first, last = mask["first"], mask["last"]
         stretches.setdefault(mask["camera"], []).append(str(first) if first == last else f"{first} to {last}")
-    left_out = "; ".join(f"{camera} of {_join_words(frames)}" for camera, frames in stretches.items())
+    left_out = "; ".join(f"{camera} of {join_names(frames)}" for camera, frames in stretches.items())
     return [*text, *([f"Cameras were left out of some frames: {left_out}."] if masks else [])]
 
 
@@ -75,10 +76,6 @@ def _forms(key: Mapping[str, Any]) -> str:
     units = {"sd_px": (1, "px"), "sd_m": (1000, "mm"), "sd_deg": (1, "°")}
     sds = [f"± {factor * key[name]:g} {unit}" for name, (factor, unit) in units.items() if name in key]
     return f"{' and '.join(key['gives'])}, {' and '.join(sds)}"
-
-
-def _join_words(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _span(values: Sequence[float], form: str) -> str:

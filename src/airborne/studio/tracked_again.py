@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airborne.body import Pose
 from airborne.body.chain import delta_between
 from airborne.cameras import Rig
+from airborne.cameras.finding import join_names
 from airborne.errors import count
 from airborne.motion.run_folder import MOTION, RUN_RECORD, read_record
 from airborne.run.folder import stretches_between
@@ -133,5 +134,4 @@ def name_frames(frames: NDArray[np.int64], step: int = 1) -> str:
     """Name frames (n,), ascending, by the stretches in which they lie, as frames 3 and 5 to 7; `step` joins them."""
     rows = np.split(frames, np.flatnonzero(np.diff(frames) > step) + 1)
     names = [f"{row[0]}" if len(row) == 1 else f"{row[0]} to {row[-1]}" for row in rows]
-    text = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    return f"{'frame' if len(frames) == 1 else 'frames'} {text}"
+    return f"{'frame' if len(frames) == 1 else 'frames'} {join_names(names)}"

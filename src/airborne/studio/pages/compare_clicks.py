@@ -34,29 +34,26 @@ class ClickComparison:
         with ui.element("div").classes("row-line tools"):
             choice = ui.select([run.name for run in runs], label="run", value=runs[0].name)
             choice.props("outlined dense options-dense").style("width: 106px")
-            ui.button("Compare", on_click=lambda: self.compare(session.folder / choice.value)).props("flat dense")
-            agree = ui.button("Agreement", on_click=lambda: self.agree(session.folder / choice.value))
+            compare = ui.button("Compare", on_click=lambda: self.show(self._compare, session.folder / choice.value))
+            compare.props("flat dense")
+            agree = ui.button("Agreement", on_click=lambda: self.show(self._agree, session.folder / choice.value))
             whom = "these clicks" if self.is_person else "everyone who digitised"
             agree.props("flat dense").tooltip(f"between the run and {whom}")
 
-    async def compare(self, run: Path) -> None:
-        """Compare a run with these clicks, into its summary and report too."""
-        found = await work("comparing", lambda: self._compare(run))
+    async def show(self, compare: Callable[[Path], str], run: Path) -> None:
+        """Compare a run with these clicks, and show what comes of it."""
+        found = await work("comparing", lambda: compare(run))
         if found is not None:
             _show_tables(found)
 
     def _compare(self, run: Path) -> str:
+        """Say how far a run is from these clicks, in its summary and report too."""
         if self.is_person:
             return assess(run, None, None, self._write_paths(run))["joints"].describe()
         return assess(run, None, self._file)["digitised"].describe()
 
-    async def agree(self, run: Path) -> None:
-        """Say how well a run agrees with the clicks, and of a thing all people and repetitions with each other."""
-        found = await work("comparing", lambda: self._agree(run))
-        if found is not None:
-            _show_tables(found)
-
     def _agree(self, run: Path) -> str:
+        """Say how well a run agrees with the clicks, and of a thing all people and repetitions with each other."""
         if self.is_person:
             return evaluate_agreement(run, joints=self._write_paths(run)).describe()
         others = [self.session.folder / each.file for each in list_repetitions(self.session.folder)]
