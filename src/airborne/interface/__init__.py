@@ -1,6 +1,7 @@
 """The public functions of `import airborne`: what the commands do, with values instead of files where that is shorter.
 
-Paths may be text. `progress=True` shows a bar; a function is called with the steps done and expected.
+Paths may be text. `progress=True` shows a bar; a function is called with the steps done and expected, where there are
+several stages with the name of the stage before them.
 """
 
 from __future__ import annotations
@@ -192,7 +193,7 @@ def smooth(
 
 
 def export_run(
-    run: Run | FilePath, *formats: str, output: FilePath | None = None, progress: bool | Progress = False
+    run: Run | FilePath, *formats: str, output: FilePath | None = None, progress: bool | StageProgress = False
 ) -> ExportResult:
     """Write a run for other programs: c3d, trc, mot, osim, gltf, bvh, csv, parquet; without formats all of them.
 
@@ -204,7 +205,7 @@ def export_run(
     unknown = [format for format in formats if format not in EXPORT_FORMATS]
     if unknown:
         raise AirborneError(f"no format {', '.join(unknown)}; there are: {', '.join(EXPORT_FORMATS)}")
-    with _reporting(progress, "exporting") as report:
+    with _reporting_stages(progress) as report:
         return write_export(_folder(run), None if output is None else Path(output), formats, report)
 
 
