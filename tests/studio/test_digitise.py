@@ -59,6 +59,8 @@ def try_points(page):
     page.get_by_role("button", name="Compare", exact=True).click()
     page.get_by_text("not compared, as the body has no such points: hand").wait_for()
     page.get_by_role("button", name="Close").last.click()
+    assert page.get_by_label("new point").input_value() == ""
+    page.get_by_label("new point").fill("hand")
     add.click()
     page.get_by_text("hand is among the points already").wait_for()
     drop = page.get_by_role("button", name="Drop", exact=True)

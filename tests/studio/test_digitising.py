@@ -8,6 +8,7 @@ from airborne.evaluation import format_clicked_frames
 from airborne.studio.digitising import (
     Repetition,
     clicks_of_frame,
+    list_other_clicks,
     list_repetitions,
     parse_repetition,
     predict_click,
@@ -65,6 +66,10 @@ def test_people_and_repetitions_are_told_from_the_files_names(tmp_path):
     ):
         (tmp_path / name).touch()
     assert list_repetitions(tmp_path) == [Repetition("A", 1), Repetition("K-2", 12)]
+    (tmp_path / "digitised.csv").touch()
+    (tmp_path / "digitised_A_1_joints.csv").touch()
+    assert "digitised.csv" in list_other_clicks(tmp_path)
+    assert not {"digitised_A_1.csv", "digitised_A_1_joints.csv"} & set(list_other_clicks(tmp_path))
 
 
 @pytest.mark.parametrize(("operator", "number"), [("", 1), ("a/b", 1), ("..", 2), ("A", 0), ("A", 100), ("A", None)])

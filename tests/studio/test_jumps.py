@@ -115,7 +115,7 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back_of_the_run_that_is_chosen(f
         assert not page.get_by_role("button", name="next lost").is_enabled()
         page.get_by_role("switch", name="Leave cameras out").click()
         page.get_by_role("button", name="Leave it out").click()
-        page.get_by_text("left out of frames 11 to 11; players are tracked again from the start").wait_for()
+        page.get_by_text("left out of frame 11; players are tracked again from the start").wait_for()
         choose_run(page, "person")
         page.get_by_text("reading the run").first.wait_for()
         page.locator("h1").click()  # out of the list

@@ -45,6 +45,7 @@ def test_what_is_missing_is_said(tmp_path):
     said = {step.name: step.says for step in steps(read_project(folder, folder / "trial.toml"))}
     assert said["Videos"] == "cam2.mp4 not found"
     assert said["Cameras"] == "click points in cam1, cam2, cam3"
+    assert states(folder)["Track"] == "empty"  # these come first
     (folder / "cross.toml").unlink()
     assert states(folder)["Body"] == "needs you"
 

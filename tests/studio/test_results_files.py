@@ -32,8 +32,11 @@ def test_a_film_and_an_export_are_made_and_linked(folder):
     with fork_studio(folder) as address, open_page(address.replace("/?", "/results?")) as page:
         page.get_by_role("button", name="Export").click()
         page.get_by_text("results.c3d").wait_for(timeout=2 * MINUTE)
-        page.get_by_label("first frame").fill("3")
+        page.get_by_label("first frame").fill("7")
         page.get_by_label("last frame").fill("6")
+        page.get_by_role("button", name="Make a film").click()
+        page.get_by_text("frames 7 to 6: the first frame must come before the last").wait_for()
+        page.get_by_label("first frame").fill("3")
         page.get_by_role("button", name="Make a film").click()
         page.get_by_text("film.mp4", exact=True).wait_for(timeout=2 * MINUTE)
         link = page.get_by_role("link", name="film.mp4").get_attribute("href")

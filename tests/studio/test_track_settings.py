@@ -17,6 +17,9 @@ def test_method_and_last_frame_are_written_into_the_trial_and_undone(tmp_path):
         method.click()
         assert page.get_by_role("option").all_text_contents() == list(PLAYERS_METHODS)
         page.get_by_role("option", name=PLAYERS_METHODS[1], exact=True).click()
+        last.fill(str(N))
+        last.press("Enter")
+        page.get_by_text(f"the last frame of all videos is {N - 1}; {N} lies after it").wait_for()
         last.fill(str(LAST))
         last.press("Enter")
         while len(track := read_toml(trial)["track"]) < 2:  # a field that is typed in is not set anew meanwhile

@@ -10,10 +10,9 @@ from airborne.cameras import Rig, camera_looking_at
 from airborne.motion import MotionWriter, read_motion
 from airborne.motion.files import read_estimates
 from airborne.motion.rows import read_rows
-from airborne.run.folder import lacks_corrections
 from airborne.studio.ghosts import ghost_of
 from airborne.studio.runs import describe_progress
-from airborne.studio.tracked_again import RunBefore, describe_tracked_again, name_frames
+from airborne.studio.tracked_again import RunBefore, describe_pending, describe_tracked_again, name_frames
 from airborne.tracking.estimate import lost_estimate
 from airborne.trial.file import read_trial
 from tests.support.person_run import PERSON, PERSON_TABLE, write_person_run
@@ -90,11 +89,15 @@ def test_a_run_lacks_the_corrections_that_its_trial_got_since(run):
     record, trial = run / "run.json", run.parent / "trial.toml"
     trial.write_text(TRIAL)
     record.write_text(json.dumps({"keys": {"0": "start"}, "masks": []}))
-    assert not lacks_corrections(read_trial(trial), run)
-    trial.write_text(f'{TRIAL}[[mask]]\ncamera = "a"\nfirst = 3\nlast = 4\n')
-    assert lacks_corrections(read_trial(trial), run)
+    assert describe_pending(read_trial(trial), run) == ""
+    trial.write_text(
+        f'{TRIAL}[[key]]\nframe = 9\nposition_m = [0, 0, 1]\n[[mask]]\ncamera = "a"\nfirst = 3\nlast = 4\n'
+    )
+    assert describe_pending(read_trial(trial), run) == (
+        "Not tracked yet: frame 9, a left out of 3 to 4. Tracking again goes over frames 1 to 11."
+    )
     record.unlink()
-    assert not lacks_corrections(read_trial(trial), run)
+    assert describe_pending(read_trial(trial), run) == ""
 
 
 def test_frames_are_named_by_stretches():

@@ -88,6 +88,13 @@ def test_masks_are_added_and_taken_away_beside_what_stands_there():
         without_mask(text, 1)
 
 
+def test_a_new_table_stands_below_an_empty_line():
+    text = with_mask(with_mask(with_key(TEXT.rstrip("\n") + "\n", 9, {"sd_m": 0.1}), "left", 3, 9), "right", 5, 5)
+    for head in ("[[key]]", "[[mask]]"):
+        assert text.count(f"\n\n{head}\n") == text.count(head) > 0
+    assert "\n\n\n" not in text
+
+
 @pytest.mark.parametrize(
     ("text", "said"), [("start = 3\n", "start is no table"), ("a = [" + "1," * 60_000 + "]", "larger")]
 )

@@ -99,8 +99,8 @@ def prepared_error_mm(folder, points):
 
 
 def pause_tracking(folder):
-    """Hold `airborne track` as soon as it has written a frame, so that it is stopped before its end."""
-    while n_tracked(folder) < 1:
+    """Hold `airborne track` as soon as it has written some frames, so that it is stopped before its end."""
+    while n_tracked(folder) < 3:
         time.sleep(0.01)
     os.kill(tracking_process(folder), signal.SIGSTOP)
 
@@ -172,6 +172,7 @@ def test_the_thrown_cross_from_videos_to_report(folder):
         user.go("Track")
         user.press("Track")
         pause_tracking(folder)
+        page.wait_for_function("() => document.querySelector('canvas.view').view.shown?.frame > 0")  # it follows
         page.get_by_role("button", name="Stop").click()
         resume_tracking(folder)
         page.get_by_text("stopped", exact=True).wait_for()

@@ -39,6 +39,13 @@ def test_frames_that_are_left_out_on_purpose_make_no_new_stretch():
     assert outages_of([90, None, None, None], step=3) == ["left: no image at 3 of 4 frames: frames 3 to 9"]
 
 
+def test_an_image_that_is_masked_is_no_outage():
+    outages = Outages(("left",), {"left": ((1, 2),)})
+    for k in range(4):
+        outages.add(Frames(k, Fraction(k, 50), (None if k else view(90),)))
+    assert list(outages.describe()) == ["left: no image at 1 of 4 frames: frame 3"]
+
+
 @pytest.mark.parametrize("n", [40, 4000])
 def test_the_report_does_not_grow_with_the_run(n):
     (line,) = outages_of([None if k % 2 else 90 for k in range(n)])

@@ -65,10 +65,14 @@ def describe_corrections(summary: Mapping[str, Any]) -> list[str]:
         text.append(f"The pose was corrected in {count(len(keys), 'frame')}: {groups}.")
     stretches: dict[str, list[str]] = {}
     for mask in masks:
-        first, last = mask["first"], mask["last"]
-        stretches.setdefault(mask["camera"], []).append(str(first) if first == last else f"{first} to {last}")
+        stretches.setdefault(mask["camera"], []).append(name_stretch(mask["first"], mask["last"]))
     left_out = "; ".join(f"{camera} of {join_names(frames)}" for camera, frames in stretches.items())
     return [*text, *([f"Cameras were left out of some frames: {left_out}."] if masks else [])]
+
+
+def name_stretch(first: int, last: int) -> str:
+    """Name frames by the first and the last of them."""
+    return str(first) if first == last else f"{first} to {last}"
 
 
 def _forms(key: Mapping[str, Any]) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from airborne.body import BodyModel
 from airborne.body.files import read_body
 from airborne.errors import ResultError
+from airborne.io.folder_lock import find_writer
 from airborne.io.text import read_json
 from airborne.motion.files import read_motion
 from airborne.motion.motion import Motion
@@ -61,6 +62,8 @@ def note_if_unfinished(folder: Path) -> str | None:
     """Say that the run in a folder is not finished; None where it is."""
     if (folder / SUMMARY).is_file():
         return None
+    if find_writer(folder) is not None:
+        return "the run goes on: these are the frames so far"
     return "the run is not finished: these are the frames so far; `airborne track --resume` goes on"
 
 

@@ -42,8 +42,7 @@ def write_film(
     """
     if path.suffix.lower() not in _WIDEST_PX:
         raise ResultError(f"{path}: films are .mp4 or .gif; name it so")
-    if first is not None and last is not None and first > last:
-        raise ResultError(f"frames {first} to {last}: the first frame must come before the last; exchange them")
+    check_order(first, last)
     index, time_s, series = _read(folder)
     first = int(index[0]) if first is None else first
     last = int(index[-1]) if last is None else last
@@ -59,6 +58,12 @@ def write_film(
         rate = readers[0].index.facts.frame_rate
         _write(path, _report(pictures, len(rows), progress), rate)
     return len(rows)
+
+
+def check_order(first: float | None, last: float | None) -> None:
+    """Raise ResultError where a film would begin after its end; None for a run's own."""
+    if first is not None and last is not None and first > last:
+        raise ResultError(f"frames {first:g} to {last:g}: the first frame must come before the last; exchange them")
 
 
 def _read(folder: Path) -> tuple[NDArray[np.int64], Array, dict[str, Array]]:

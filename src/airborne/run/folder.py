@@ -9,7 +9,7 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from airborne import __version__
 from airborne.body.files import mesh_files
@@ -104,8 +104,8 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
 def stretches_between(recorded: dict[str, Any], identity: dict[str, Any]) -> list[tuple[float, float]]:
     """Return what is tracked again between two identities that differ in keys and masks alone; see `stretches_of`."""
     recorded = _with_keys(recorded, identity)
-    masks = [mask for mask in (*recorded["masks"], *identity["masks"]) if _is_changed(mask, recorded, identity)]
-    return stretches_of(recorded["keys"], identity["keys"], [(mask["first"], mask["last"]) for mask in masks])
+    masks = [(mask["first"], mask["last"]) for mask in _changed_masks(recorded, identity)]
+    return stretches_of(recorded["keys"], identity["keys"], masks)
 
 
 def _with_keys(recorded: dict[str, Any], identity: dict[str, Any]) -> dict[str, Any]:
@@ -114,8 +114,9 @@ def _with_keys(recorded: dict[str, Any], identity: dict[str, Any]) -> dict[str, 
     return {"keys": first, "masks": [], **recorded}
 
 
-def _is_changed(mask: dict[str, Any], *identities: Mapping[str, Any]) -> bool:
-    return not all(mask in identity["masks"] for identity in identities)
+def _changed_masks(*identities: Mapping[str, Any]) -> list[dict[str, Any]]:
+    every = [mask for identity in identities for mask in identity["masks"]]
+    return [mask for mask in every if not all(mask in identity["masks"] for identity in identities)]
 
 
 def stretches_of(
@@ -193,13 +194,23 @@ def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
     return json.loads(json.dumps(settings))
 
 
-def lacks_corrections(trial: Trial, folder: Path) -> bool:
-    """Say whether a trial has other keys or masks than its run in a folder was tracked with; not without a record."""
+class PendingCorrections(NamedTuple):
+    """The corrections of a trial that are others than those its run was tracked with."""
+
+    keys: list[int]  # frames of keys that are new, changed or gone
+    masks: list[dict[str, Any]]  # that are new or gone
+    stretches: list[tuple[float, float]]  # that are tracked again; see `stretches_of`
+
+
+def pending_corrections(trial: Trial, folder: Path) -> PendingCorrections:
+    """Return the corrections that a trial got since its run in a folder was tracked; none without a record."""
     if not (folder / RUN_RECORD).is_file():
-        return False
+        return PendingCorrections([], [], [])
     now = json.loads(json.dumps(_corrections(trial)))
     recorded = _with_keys(read_record(folder / RUN_RECORD), now)
-    return any(recorded[name] != now[name] for name in now)
+    old, new = recorded["keys"], now["keys"]
+    keys = sorted(int(frame) for frame in {*old, *new} if old.get(frame) != new.get(frame))
+    return PendingCorrections(keys, _changed_masks(recorded, now), stretches_between(recorded, now))
 
 
 def _corrections(trial: Trial) -> dict[str, Any]:

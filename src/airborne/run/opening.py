@@ -130,8 +130,8 @@ def _camera_as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Cam
 def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
     """Return a camera's video: a file, or the address of a camera on the network."""
     path = camera.video if camera.video.startswith(ADDRESS) else trial.path(camera.video)
-    left_out = tuple((mask.first, mask.last) for mask in trial.mask if mask.camera == camera.name)
-    return VideoSource(camera.name, path, camera.fields, camera.offset_s, camera.drift_ppm, camera.exposure_s, left_out)
+    times = camera.offset_s, camera.drift_ppm, camera.exposure_s
+    return VideoSource(camera.name, path, camera.fields, *times, trial.masked(camera.name))
 
 
 def past_the_end_error(trial: Trial, recording: Recording | LiveRecording) -> TrialError:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.errors import ResultError
 from airborne.motion import PlayersMotion
-from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, holds_players
+from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, SUMMARY, holds_players
 from airborne.studio.runs import run_body, run_players, run_rows
 from airborne.studio.strips import FROM_GOOD, ranks_of, run_strips
 from airborne.types import Array
@@ -42,6 +42,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
 
     `what` is one of `curve_kinds`; raises ResultError for another. A strip is how a joint or a player went: a digit a
     frame, its place in `strips.FROM_GOOD`.
+    `is_provisional`: deviations grow once a run ends, with what all of its frames say of the cameras.
     Of a long run several frames share a point: the least and the greatest of their values, the worst of their statuses.
     """
     unit = "m"
@@ -69,6 +70,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
         ranks = np.maximum.reduceat(ranks, starts).repeat(2, axis=0)
     return {
         "is_thinned": is_thinned,
+        "is_provisional": bool(sd.shape[1]) and not (run / SUMMARY).is_file(),
         "frame": index.tolist(),
         "time_s": time_s.tolist(),
         "status": FROM_GOOD[worst].tolist(),

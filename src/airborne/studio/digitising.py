@@ -20,6 +20,7 @@ from airborne.studio.folder import files_inside
 from airborne.types import Array
 
 _FILE = re.compile(r"digitised_([A-Za-z0-9-]{1,20})_([1-9]\d?)\.csv")
+JOINTS_ENDING = "_joints.csv"  # of paths that are made of clicks
 _MOST_APART = 5  # frames between clicks from which a further one is predicted
 
 
@@ -53,6 +54,12 @@ def list_repetitions(folder: Path) -> list[Repetition]:
     """List whose clicks lie in a folder."""
     found = [_FILE.fullmatch(path.name) for path in files_inside(folder, ".csv")]
     return [Repetition(match[1], int(match[2])) for match in found if match is not None]
+
+
+def list_other_clicks(folder: Path) -> list[str]:
+    """List the tables of clicks in a folder that were not made here, by their names: digitised.csv and the like."""
+    names = [path.name for path in files_inside(folder, ".csv") if path.name.startswith("digitised")]
+    return [name for name in names if _FILE.fullmatch(name) is None and not name.endswith(JOINTS_ENDING)]
 
 
 def default_points(model: BodyModel | None) -> tuple[str, ...]:

@@ -229,8 +229,8 @@ def _start_state(project: Project) -> tuple[StepState, str]:
 
 def _run_steps(project: Project) -> Iterator[StudioStep]:
     runs = list_runs(project.folder)
-    is_prepared = all(project.table(name) for name in ("calibration", "body"))
-    finished = [run for run in runs if (run / SUMMARY).is_file()]
+    is_prepared = all(state == "ready" for state, _ in (_cameras_state(project), _body_state(project)))
+    finished, says = [run for run in runs if (run / SUMMARY).is_file()], ""
     if finished:
         yield StudioStep("Track", "/track", "ready", finished[0].name)
     elif runs:
@@ -248,5 +248,5 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
         "Results",
         "/results",
         "ready" if finished else "empty",
-        "report" if reports else "tables" if finished else "no run yet",
+        "report" if reports else "tables" if finished else says or "no run yet",
     )

@@ -1,5 +1,6 @@
 // Draws a 3D scene when something in it has changed: NiceGUI draws 20 times a second, which busies a processor that must
 // do without a graphics card. There a scene takes 100 ms, for which no picture is shown: it waits until nobody steps on.
+// And fits the scene to its place, which NiceGUI does where the window changes, but not where a line comes above it.
 import { THREE } from "nicegui-scene";
 
 const SAME = 1e-6; // m, and of directions: a camera at rest drifts by rounding
@@ -9,8 +10,9 @@ const LEAST_SHARE = 0.05; // of the time in which it is drawn nonetheless, where
 
 export default class Redraw {
   create_mesh(scene_id) {
-    const renderer = getElement(scene_id)?.renderer; // the scene is NiceGUI's; it is gone where the page was laid out anew
+    const place = getElement(scene_id), renderer = place?.renderer; // the scene is NiceGUI's; it is gone where the page was laid out anew
     if (!renderer) return new THREE.Group();
+    new ResizeObserver(() => place.$el.clientHeight && place.resize()).observe(place.$el);
     const draw = renderer.render.bind(renderer);
     let drawn = [], took = 0, ended = -Infinity, stepped = -Infinity;
     const step = () => (stepped = performance.now());

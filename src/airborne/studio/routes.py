@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from threading import Event
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from airborne import export
 from airborne.body import BodyModel
 from airborne.errors import AirborneError, ResultError
 from airborne.export.pictures import thumbnail
-from airborne.motion.run_folder import REPORT
+from airborne.motion.run_folder import REPORT, SUMMARY
 from airborne.studio.calibrating import find_picture
 from airborne.studio.curve_data import run_curves
 from airborne.studio.field_order import ORDERS, order_jpeg
@@ -26,7 +26,7 @@ from airborne.studio.not_found import not_found_html
 from airborne.studio.outlines import BESIDE_COLOUR, run_overlay
 from airborne.studio.pictures import SHRINKS
 from airborne.studio.project import find_run, list_videos
-from airborne.studio.runs import run_body
+from airborne.studio.runs import last_frame, run_body
 from airborne.studio.session import Session
 from airborne.studio.stage import part_stl
 from airborne.studio.starts import FOUND_PICTURE
@@ -100,7 +100,7 @@ def add_routes(app: FastAPI, session: Session) -> None:
 
     @app.get("/curves/{run}")
     async def curves(run: str, beside: str = "", of: str = "") -> Response:
-        return await _answer(lambda: _json(_curves(session.folder, run, beside, of)))
+        return await _answer(lambda: _json(_curves(session, run, beside, of)))
 
     @app.get("/mesh/{run}/{part}")
     async def mesh(run: str, part: int) -> Response:
@@ -143,9 +143,13 @@ def _overlay(session: Session, name: str, frame: int, beside: str) -> dict[str, 
     return {"items": [*other["items"], *own["items"]], "label": own["label"]}
 
 
-def _curves(folder: Path, name: str, beside: str, what: str) -> dict[str, Any]:
-    own = run_curves(_run(folder, name), what)
-    return {**own, "beside": run_curves(_run(folder, beside), what)} if beside else own
+def _curves(session: Session, name: str, beside: str, what: str) -> dict[str, Any]:
+    run = _run(session.folder, name)
+    own = run_curves(run, what)
+    if not (run / SUMMARY).is_file():  # it goes on, or will
+        with suppress(AirborneError):
+            own["last"] = last_frame(session.project().trial(), len(session.shown().clock))
+    return {**own, "beside": run_curves(_run(session.folder, beside), what)} if beside else own
 
 
 async def _answer(make: Callable[[], Response], workers: ThreadPoolExecutor = _WORKERS) -> Response:

@@ -77,9 +77,17 @@ def _read_players(run: Path, stamp: Any) -> PlayersMotion:
 
 def count_frames(trial: Trial, n_images: int) -> int:
     """Return how many frames a run of a trial has in all; its videos have this many."""
-    track = trial.track
-    stop = n_images if track.stop is None else min(n_images, track.stop)
-    return len(range(trial.start.frame, stop, track.every))
+    return len(_frames_of(trial, n_images))
+
+
+def last_frame(trial: Trial, n_images: int) -> int:
+    """Return the last of them; the start where there is none."""
+    return max([trial.start.frame, *_frames_of(trial, n_images)[-1:]])
+
+
+def _frames_of(trial: Trial, n_images: int) -> range:
+    stop = n_images if trial.track.stop is None else min(n_images, trial.track.stop)
+    return range(trial.start.frame, stop, trial.track.every)
 
 
 def describe_progress(n_done: int, n_frames: int) -> str:

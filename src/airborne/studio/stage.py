@@ -81,10 +81,14 @@ def _scene(middle: Array, away_m: float, *, has_floor: bool = True) -> Scene:
     """Build an empty scene that is seen from `away_m` beside its middle (3,) [m]."""
     floor_m = 2 * math.ceil(np.linalg.norm(middle[:2]) + _FLOOR * away_m)  # about the origin
     scene = ui.scene(grid=(floor_m, floor_m) if has_floor else False, background_color="#f6f7f8").style(
-        "width: 100%; flex: 1; min-height: 180px"
+        "width: 100%; flex: 1; min-height: 110px"
     )
     with scene:
         Redraw(scene.id)
+        if has_floor:
+            for name, end in zip("xyz", np.eye(3), strict=True):
+                _lines(scene, [(np.zeros(3), end)], _CAMERA_COLOUR)
+                scene.text(f"{name} 1 m", "font-size: 11px; color: #5d666f").move(*map(float, end))
     (x, y, z), (u, v, w) = (map(float, each) for each in (middle + away_m * FROM, middle))
     scene.move_camera(x, y, z, look_at_x=u, look_at_y=v, look_at_z=w, duration=0)
     return scene

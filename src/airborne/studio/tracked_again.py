@@ -15,8 +15,9 @@ from airborne.body.chain import delta_between
 from airborne.cameras import Rig
 from airborne.cameras.finding import join_names
 from airborne.errors import count
+from airborne.export.methods_text import name_stretch
 from airborne.motion.run_folder import MOTION, RUN_RECORD, read_record
-from airborne.run.folder import stretches_between
+from airborne.run.folder import pending_corrections, stretches_between
 from airborne.run.keys import read_key
 from airborne.studio.folder import file_stamp
 from airborne.studio.runs import run_body, run_rig, run_rows
@@ -67,6 +68,23 @@ def describe_tracked_again(before: RunBefore, run: Path, trial: Trial) -> str:
     if len(lost):
         told.append(f"{name_frames(lost, step)} {'is' if len(lost) == 1 else 'are'} lost")
     return "; ".join([f"{name_frames(rows.index[is_new], step)} tracked again", *told])
+
+
+def describe_pending(trial: Trial, run: Path) -> str:
+    """Name the corrections that a run was tracked without, and the frames that they touch; empty where there are none.
+
+    Raises AirborneError.
+    """
+    pending, index = pending_corrections(trial, run), run_rows(run).index
+    what = [name_frames(np.array(pending.keys))] if pending.keys else []
+    what += [f"{mask['camera']} left out of {name_stretch(mask['first'], mask['last'])}" for mask in pending.masks]
+    if not what:
+        return ""
+    touched = np.zeros(len(index), bool)
+    for first, last in pending.stretches:
+        touched |= (first < index) & (index < last)
+    frames = name_frames(index[touched], trial.track.every) if touched.any() else "no frame of this run"
+    return f"Not tracked yet: {', '.join(what)}. Tracking again goes over {frames}."
 
 
 def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[str]:
@@ -133,5 +151,5 @@ def _plain(name: str) -> str:
 def name_frames(frames: NDArray[np.int64], step: int = 1) -> str:
     """Name frames (n,), ascending, by the stretches in which they lie, as frames 3 and 5 to 7; `step` joins them."""
     rows = np.split(frames, np.flatnonzero(np.diff(frames) > step) + 1)
-    names = [f"{row[0]}" if len(row) == 1 else f"{row[0]} to {row[-1]}" for row in rows]
+    names = [name_stretch(row[0], row[-1]) for row in rows]
     return f"{'frame' if len(frames) == 1 else 'frames'} {join_names(names)}"

@@ -82,7 +82,7 @@ def with_mask(text: str, camera: str, first: int, last: int) -> str:
     document = _parse(text)
     mask = tomlkit.table()
     mask.update({"camera": camera, "first": first, "last": last})
-    document.setdefault("mask", tomlkit.aot()).append(mask)
+    _append(document, "mask", mask)
     return tomlkit.dumps(document)
 
 
@@ -115,13 +115,19 @@ def with_players(text: str, frame: int, start_of: Mapping[str, Mapping[str, Any]
 
 def _key(document: tomlkit.TOMLDocument, frame: int) -> Any:
     """Return the [[key]] of a frame, made if need be."""
-    keys = document.setdefault("key", tomlkit.aot())
-    key = next((each for each in keys if each.get("frame") == frame), None)
+    key = next((each for each in document.get("key", []) if each.get("frame") == frame), None)
     if key is None:
         key = tomlkit.table()
         key.add("frame", frame)
-        keys.append(key)
+        _append(document, "key", key)
     return key
+
+
+def _append(document: tomlkit.TOMLDocument, name: str, table: Table) -> None:
+    """Add a table to an array of tables, below an empty line."""
+    if document and not tomlkit.dumps(document).endswith("\n\n"):
+        table.trivia.indent = "\n"
+    document.setdefault(name, tomlkit.aot()).append(table)
 
 
 def _set(table: Any, key: str, value: Any) -> None:

@@ -189,6 +189,10 @@ class Trial(SettingsTable):
         optional = (self.body.source_file, self.calibration.file, self.calibration.control_points, self.torso)
         return (*(name for name in optional if name is not None), *self.start.source_files)
 
+    def masked(self, camera: str) -> tuple[tuple[int, int], ...]:
+        """Return the first and last frame of each stretch in which a camera is left out."""
+        return tuple((mask.first, mask.last) for mask in self.mask if mask.camera == camera)
+
     def path(self, name: str) -> Path:
         """Resolve a path of the trial file."""
         return self._folder / name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -45,13 +45,18 @@ class Outages:
     """Watches the cameras of a recording; its memory does not grow with the recording."""
 
     names: Sequence[str]  # of the cameras, in the rig's order
+    masked: Mapping[str, Sequence[tuple[int, int]]] = field(
+        default_factory=dict
+    )  # camera -> first and last frames of it
     _n_times: int = 0
     _missing: dict[str, _FrameRuns] = field(default_factory=dict)
     _dark: dict[str, _FrameRuns] = field(default_factory=dict)
 
     def add(self, frames: Frames) -> None:
-        """Record the outages of one time."""
+        """Record the outages of one time; an image that is masked is none."""
         for name, view in zip(self.names, frames.views, strict=True):
+            if view is None and any(first <= frames.index <= last for first, last in self.masked.get(name, ())):
+                continue
             if view is None:
                 self._missing.setdefault(name, _FrameRuns()).add(frames.index, self._n_times)
             elif is_dark(view):

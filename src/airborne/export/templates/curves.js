@@ -6,7 +6,8 @@ const STRIP = 12, ROW = 10, LEGIBLE = 8, MOST_NAMES = 6, LEFT = 58, RIGHT = 10, 
 
 // data: {frame, time_s, status, series: [{name, unit, value, sd}]}; null where nothing is known. {is_thinned}: two rows in a
 // row hold the least and the greatest of the frames from the first's to the next but one. What another run has,
-// {beside: {frame, series}}, is drawn with dashes. {strips: [{name, rank}]}: how each joint or player went, a digit a frame.
+// {beside: {frame, series}}, is drawn with dashes. {last}: the frame up to which a run that goes on will go.
+// {strips: [{name, rank}]}: how each joint or player went, a digit a frame.
 export function drawCurves(canvas, data, now) {
   const box = boxOf(canvas), ratio = (window.devicePixelRatio || 1) * box.zoom;
   if (!box.width) return;
@@ -34,7 +35,7 @@ export function drawCurves(canvas, data, now) {
   const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${data.status[row]}${namesOf(data, row)}`;
   pen.fillStyle = "#5d666f";
   pen.font = FONT;
-  pen.fillText(`frame ${now}${time}`, LEFT, box.height - 4);
+  pen.fillText(`frame ${now}${time}${data.is_provisional ? "   ± not final: it grows when the run ends" : ""}`, LEFT, box.height - 4);
   drawLegend(pen, data.series, data.series.map((each) => valueAt(each, data, now)), canvas);
 }
 
@@ -97,7 +98,7 @@ function boxOf(canvas) {
   return { left, width: width / zoom, height: height / zoom, zoom };
 }
 
-function spanOf({ frame }) { return { first: frame[0], last: Math.max(frame[frame.length - 1], frame[0] + 1) }; }
+function spanOf({ frame, last = 0 }) { return { first: frame[0], last: Math.max(frame[frame.length - 1], frame[0] + 1, last) }; }
 
 function rangeOf(series) {
   let low = Infinity, high = -Infinity;

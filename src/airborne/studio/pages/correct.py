@@ -11,7 +11,6 @@ from nicegui import ui
 from airborne.body import Pose
 from airborne.cameras import Camera
 from airborne.errors import TrialError
-from airborne.run.folder import lacks_corrections
 from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.ghosts import ghost_of
@@ -24,7 +23,7 @@ from airborne.studio.pictures import ShownTrial
 from airborne.studio.runs import count_frames, count_rows, describe_progress, run_body, run_rig, run_rows
 from airborne.studio.session import Session
 from airborne.studio.starts import POSE_COLOUR
-from airborne.studio.tracked_again import RunBefore, describe_tracked_again, name_frames
+from airborne.studio.tracked_again import RunBefore, describe_pending, describe_tracked_again, name_frames
 from airborne.studio.trial_edits import with_clicks, with_key
 from airborne.studio.view import CameraViews, Drag, Mark
 from airborne.trial.keys import KeyTable
@@ -32,10 +31,7 @@ from airborne.trial.settings import KEY_METHODS
 from airborne.types import Array
 
 _JOINT_COLOUR, _CLICK_COLOUR, _GHOST_COLOUR = "#ffffff", "#f0e442", "#ffffff"
-_HINT = (
-    "Drag a joint, or the body by its outline, to where the pictures show it; Shift turns it. Then track again around "
-    "it."
-)
+_HINT = "Drag a joint, or the body by its outline; Shift turns it. Then track again."
 
 
 class Correction:
@@ -69,18 +65,21 @@ class Correction:
             self.again = ui.button("Track again around it", on_click=self.track).props("unelevated")
             self.watch = CommandWatch(self.session, "track", self.show_anew, words="tracking", how_far=self._how_far)
             self.watch.buttons = [self.again]
-        self._find_untracked()
+        self.pending = ui.label().classes("small warn")
+        self.pending.bind_visibility_from(self.pending, "text")
+        self._show_pending()
+        if self.pending.text:
+            self._tracked = None
+        self.again.set_visibility(self._tracked is None)
         self.hint = ui.label().classes("small")
         self.hint.bind_visibility_from(self.switch, "value")
 
-    def _find_untracked(self) -> None:
-        """Offer to track again where the trial has corrections that the run has not been tracked with."""
+    def _show_pending(self) -> None:
+        """Name the corrections that the run was tracked without, and what tracking again goes over."""
         project = self.session.project()
+        is_whole = not project.mistake and bool(project.table("start")) and not self.watch.is_running
         with show_errors():
-            if not project.mistake and project.table("start") and lacks_corrections(project.trial(), self.folder):
-                self._tracked = None
-                self.watch.says.set_text("the trial has corrections that this run was tracked without")
-        self.again.set_visibility(self._tracked is None)
+            self.pending.set_text(describe_pending(project.trial(), self.folder) if is_whole else "")
 
     def _how_far(self) -> str:
         """Say how many frames the run has while it is tracked again."""
@@ -88,7 +87,8 @@ class Correction:
         if command is None or self._before is None or not self._before.is_changed(self.folder):
             return describe_progress(0, 1)
         n_frames = count_frames(self.session.project().trial(), len(self.shown.clock))
-        return describe_progress(max(count_rows(self.folder)[0], command.n_done()), n_frames)
+        n_done = command.n_done()  # none while it opens the videos, whatever the run has kept
+        return describe_progress(max(count_rows(self.folder)[0], n_done) if n_done else 0, n_frames)
 
     async def turn_to(self, frame: int) -> None:
         """Show the body of a frame and its joints, to be grabbed."""
@@ -122,7 +122,8 @@ class Correction:
             self._show(self.frame)
             return
         self._seen = held
-        self.watch.says.set_text("" if held == self._tracked else "the corrections have changed")
+        self.watch.says.set_text("")
+        self._show_pending()
         self.again.set_visibility(held != self._tracked)
         await self.turn_to(self.frame)
 
@@ -202,6 +203,7 @@ class Correction:
         """Say what was written, and offer to track again."""
         self._seen = self._held()
         self.watch.says.set_text(what)
+        self._show_pending()
         self.again.set_visibility(True)
         self._show(self.frame)
 
@@ -211,6 +213,7 @@ class Correction:
         with show_errors():
             self._before = RunBefore.of(self.folder)
         self.watch.start("track", self.session.path.name, "-o", self.folder.name, "--resume")
+        self._show_pending()
 
     async def show_anew(self, command: Command) -> None:
         """Show what came of it."""
@@ -218,6 +221,7 @@ class Correction:
             return
         await self._files.look()
         self._tracked = self._asked
+        self._show_pending()
         self.again.set_visibility(self._held() != self._tracked)
         before, text = self._before, "tracked again"
         with show_errors():

@@ -47,7 +47,7 @@ _AFTER = {"point": "next point", "frame": "next frame", "stay": "nothing"}
 async def digitise_page(session: Session) -> None:
     """Let one person digitise points, and compare."""
     async with page_frame(session, "Digitise", "Where do you see it?", _HELP) as changed:
-        if name_missing_steps(session, "camera"):
+        if name_missing_steps(session, "Videos"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:
@@ -104,7 +104,7 @@ class DigitisePanel(PointsPanel):
                 self.list = PointList(self.shown.names, self.choose, empty=_EMPTY)
                 with ui.element("div").classes("card"):
                     self._build_points()
-                    ClickComparison(self.session, self.model, lambda: (self.who, self.table))
+                    ClickComparison(self.session, self.model, self.shown.names, lambda: (self.who, self.table))
         self.show()
 
     def _build_who(self) -> None:
@@ -124,7 +124,7 @@ class DigitisePanel(PointsPanel):
     def _build_points(self) -> None:
         with ui.element("div").classes("row-line tools"):
             name = ui.input("new point").props("dense outlined").style("width: 114px")
-            ui.button("Add", on_click=lambda: self.add(name.value or "")).props("flat dense")
+            ui.button("Add", on_click=lambda: self.add(name)).props("flat dense")
             ui.button("Drop", on_click=self.drop).props("flat dense").tooltip("the chosen point, one of your own")
             ui.button("Remove", on_click=self.remove).props("flat dense").tooltip("the chosen click")
 
@@ -185,9 +185,9 @@ class DigitisePanel(PointsPanel):
                 self.session.edit(self.who.record, record_text(self.who), "epipolar help used")
         self.show()
 
-    async def add(self, name: str) -> None:
-        """Add a point of the user's own."""
-        name = name.strip()
+    async def add(self, field: ui.input) -> None:
+        """Add a point of the user's own, named in a field."""
+        name = (field.value or "").strip()
         if not name.replace("_", "").replace("-", "").isalnum() or len(name) > 40:
             complain("a point's name is 1 to 40 letters, digits, hyphens and underscores")
             return
@@ -197,6 +197,7 @@ class DigitisePanel(PointsPanel):
             with show_errors():
                 self.session.keep_draft(_DRAFT, [*self.extra, name], f"{name} added to the points")
                 self.extra = self._kept()
+        field.value = ""
         self.table = add_points(self.table, [name])
         self.clicked = self._of_frame()
         await self.choose(name)

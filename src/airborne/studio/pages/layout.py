@@ -20,7 +20,6 @@ _SILENT_S = 0.1  # a wait that is not announced: shorter ones are not felt as su
 _LOOK_EVERY_S = 0.25  # for changes by this window, by others and by other programs: the rail follows at once
 _BLUE = "#0072b2"  # of buttons: dark enough for white letters
 _GREEN = "#006b3c"  # of good news, likewise
-_STEP_OF = {"camera": "Videos", "calibration": "Cameras", "body": "Body"}  # where each table is written
 _KEYS = {
     "← →": "one frame back or on; with Shift ten",
     ", .": "one frame back or on, also while a point is chosen",
@@ -146,7 +145,7 @@ def _rail(session: Session, here: str) -> None:
                 link.props("aria-current=step")
             ui.label("✓" if step.state == "ready" else str(number)).classes("number")
             ui.label(step.name).classes("title")
-            ui.label(step.says).classes("says")
+            ui.label(step.says).classes("says")._props["title"] = step.says
 
 
 def _guide(session: Session, here: str, page: str) -> None:
@@ -181,9 +180,9 @@ def _example(here: str) -> ui.dialog:
     return dialog
 
 
-def name_missing_steps(session: Session, *tables: str) -> bool:
-    """Tell which steps come first, where the trial lacks tables that this one needs; return whether it does."""
-    missing = [_STEP_OF[table] for table in tables if not session.project().tables.get(table)]
+def name_missing_steps(session: Session, *needed: str) -> bool:
+    """Tell which of the steps that this one needs come first, as they are not ready; return whether any is."""
+    missing = [step.name for step in steps(session.project()) if step.name in needed and step.state != "ready"]
     if missing:
         verb = "comes" if len(missing) == 1 else "come"
         ui.label(f"First {verb} {', '.join(missing)}: see the steps at the left.").classes("warn")

@@ -9,6 +9,7 @@ from nicegui import ui
 
 from airborne.motion.run_folder import FOLDERS
 from airborne.run.export import EXPORT_FORMATS
+from airborne.run.film import check_order
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import show_errors
@@ -45,10 +46,14 @@ class Making:
     def film(self) -> None:
         """Start `airborne film`."""
         path = f"{self._folder.name}/{FOLDERS[2]}/film.{self._kind.value}"
-        ends = [("--first", self._first.value), ("--last", self._last.value)]
-        words = [word for name, value in ends if value is not None for word in (name, str(int(value)))]
+        first, last = self._first.value, self._last.value
+        words = [
+            word for name, n in (("--first", first), ("--last", last)) if n is not None for word in (name, f"{n:.0f}")
+        ]
         self._watch.words = "drawing the film"
-        self._watch.start("film", self._folder.name, "-o", path, *words)
+        with show_errors():
+            check_order(first, last)
+            self._watch.start("film", self._folder.name, "-o", path, *words)
 
     def show_files(self, command: Command) -> None:
         """Show what was made."""

@@ -6,12 +6,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import numpy as np
 from nicegui import ui
 
 from airborne.errors import TrialError
+from airborne.export.methods_text import name_stretch
 from airborne.studio.pages.layout import show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
+from airborne.studio.tracked_again import name_frames
 from airborne.studio.trial_edits import with_mask, without_mask
 from airborne.studio.view import CameraViews, Item
 
@@ -63,7 +66,7 @@ class MaskPanel:
         camera = str(self.camera.value)
         with show_errors():
             last, note = clip_frames(first, last, self._end)
-            what = f"{camera} left out of frames {first} to {last}{note}"
+            what = f"{camera} left out of {name_frames(np.arange(first, last + 1))}{note}"
             self._edit(lambda text: with_mask(text, camera, first, last), what)
 
     def remove(self, number: int, camera: str) -> None:
@@ -78,7 +81,7 @@ class MaskPanel:
 
     def _list(self) -> None:
         for number, mask in self.masks:
-            text = f"{mask['camera']}: {mask['first']} to {mask['last']}  ✕"
+            text = f"{mask['camera']}: {name_stretch(mask['first'], mask['last'])}  ✕"
             button = ui.button(text, on_click=partial(self.remove, number, str(mask["camera"])))
             button.props("flat dense no-caps").tooltip("use it again")
 

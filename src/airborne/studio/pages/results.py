@@ -9,7 +9,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from airborne.errors import ResultError, count
-from airborne.export.methods_text import describe_methods
+from airborne.export.methods_text import describe_corrections, describe_methods
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
 from airborne.studio.pages.layout import in_thread, name_outer_links, page_frame
@@ -18,6 +18,7 @@ from airborne.studio.project import list_outer_runs, list_runs
 from airborne.studio.session import Session
 
 _HELP = "The report is one file, to send or to print. The tables open in any spreadsheet."
+_CHECKED = "Self-check of size, cameras and times"
 _NUMBERS = {
     "n_frames": "frames",
     "n_tracked": "tracked",
@@ -88,13 +89,16 @@ def _numbers(summary: dict[str, Any]) -> None:
                             ui.label(text)
     findings = summary.get("self_check") or []
     alarms = [finding for finding in findings if finding["is_alarm"]]
-    title = f"Self-check: {count(len(alarms), 'alarm')}" if alarms else "Self-check: nothing seems wrong"
-    if findings:
-        with ui.expansion(title, value=bool(alarms)).props("dense"):
-            for finding in findings:
-                ui.label(finding["sentence"]).classes("bad small" if finding["is_alarm"] else "soft small")
     for text in summary.get("warnings") or []:
         ui.label(text).classes("warn small")
+    for text in describe_corrections(summary):
+        ui.label(text).classes("small")
+    if findings:
+        with ui.expansion(
+            f"{_CHECKED}: {count(len(alarms), 'alarm') if alarms else 'no alarm'}", value=bool(alarms)
+        ).props("dense"):
+            for finding in findings:
+                ui.label(finding["sentence"]).classes("bad small" if finding["is_alarm"] else "soft small")
     with ui.expansion("For a methods section").props("dense"):
         ui.label(describe_methods(summary)).classes("small").style("max-width: 90ch; user-select: text")
 

@@ -30,7 +30,7 @@ _HELP = (
 async def track_page(session: Session) -> None:
     """Start, watch, stop and resume a run."""
     async with page_frame(session, "Track", "Follow the body", _HELP) as changed:
-        if name_missing_steps(session, "camera", "calibration", "body"):
+        if name_missing_steps(session, "Videos", "Cameras", "Body"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:
@@ -78,7 +78,7 @@ class _Panel:
             self.halt = ui.button("Stop", on_click=self.stop).props("unelevated color=grey-8")
             self.bar = (
                 ui.linear_progress(0, show_value=False, size="10px")
-                .props("rounded aria-label=progress")
+                .props("rounded aria-label=progress animation-speed=200")
                 .style("width: 220px")
             )
             self.says = ui.label().classes("small soft")
@@ -182,7 +182,7 @@ class _Panel:
             self.ended = command
             self._say_end(command)
         if n_done != self.n_done:
-            is_first, self.n_done = self.n_done < 0, n_done
+            is_first, self.n_done = self.n_done <= 0, n_done
             self.view.run_method("refresh")
             self._show_curves()
             if newest is not None and self._is_running:
@@ -235,7 +235,8 @@ class _Panel:
         self.name.set_enabled(not is_running)
         self.bar.set_visibility(is_running)
         self.halt.set_visibility(is_running)
-        self.begin.set_visibility(not is_running and not is_begun and not problem)
+        self.begin.set_visibility(not is_running and not is_begun)
+        self.begin.set_enabled(not problem)
         self.resume.set_visibility(not is_running and is_begun and not is_finished)
         self.again.set_visibility(not is_running and is_begun)
         if problem or self._problem:

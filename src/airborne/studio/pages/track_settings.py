@@ -59,6 +59,8 @@ class TrackSettingsBar:
         with show_errors():
             if last < frame:
                 raise TrialError(f"the first pose is that of frame {frame}; give a last frame from there on")
+            if last >= self._n_images:
+                raise TrialError(f"the last frame of all videos is {self._n_images - 1}; {last} lies after it")
             stop = last + 1 if last + 1 < self._n_images else None
             if stop != self._trial.track.stop:
                 self._set("stop", stop, f"last frame {last}")
