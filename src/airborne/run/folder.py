@@ -104,7 +104,7 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
 def stretches_between(recorded: dict[str, Any], identity: dict[str, Any]) -> list[tuple[float, float]]:
     """Return what is tracked again between two identities that differ in keys and masks alone; see `stretches_of`."""
     recorded = _with_keys(recorded, identity)
-    masks = [(mask["first"], mask["last"]) for mask in _changed_masks(recorded, identity)]
+    masks = [(mask["first"], mask["last"]) for mask in _mask_changes(recorded, identity)]
     return stretches_of(recorded["keys"], identity["keys"], masks)
 
 
@@ -114,7 +114,7 @@ def _with_keys(recorded: dict[str, Any], identity: dict[str, Any]) -> dict[str, 
     return {"keys": first, "masks": [], **recorded}
 
 
-def _changed_masks(*identities: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _mask_changes(*identities: Mapping[str, Any]) -> list[dict[str, Any]]:
     every = [mask for identity in identities for mask in identity["masks"]]
     return [mask for mask in every if not all(mask in identity["masks"] for identity in identities)]
 
@@ -210,7 +210,7 @@ def pending_corrections(trial: Trial, folder: Path) -> PendingCorrections:
     recorded = _with_keys(read_record(folder / RUN_RECORD), now)
     old, new = recorded["keys"], now["keys"]
     keys = sorted(int(frame) for frame in {*old, *new} if old.get(frame) != new.get(frame))
-    return PendingCorrections(keys, _changed_masks(recorded, now), stretches_between(recorded, now))
+    return PendingCorrections(keys, _mask_changes(recorded, now), stretches_between(recorded, now))
 
 
 def _corrections(trial: Trial) -> dict[str, Any]:

@@ -131,7 +131,7 @@ def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
     """Return a camera's video: a file, or the address of a camera on the network."""
     path = camera.video if camera.video.startswith(ADDRESS) else trial.path(camera.video)
     times = camera.offset_s, camera.drift_ppm, camera.exposure_s
-    return VideoSource(camera.name, path, camera.fields, *times, trial.masked(camera.name))
+    return VideoSource(camera.name, path, camera.fields, *times, trial.mask_stretches(camera.name))
 
 
 def past_the_end_error(trial: Trial, recording: Recording | LiveRecording) -> TrialError:

@@ -171,7 +171,7 @@ def _track(
     """Track every frame, written and drawn at once; return the subject as seen, and live frames' delays [s]."""
     folder, drawn, recording = options.folder, options.drawn, subject.recording
     delays_s = array("d")
-    outages = Outages(recording.rig.names, {name: subject.trial.masked(name) for name in recording.rig.names})
+    outages = Outages(recording.rig.names, {name: subject.trial.mask_stretches(name) for name in recording.rig.names})
     with ExitStack() as stack:
         frames = stack.enter_context(closing(iter(recording)))
         first = next(frames, None)

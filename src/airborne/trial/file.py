@@ -189,7 +189,7 @@ class Trial(SettingsTable):
         optional = (self.body.source_file, self.calibration.file, self.calibration.control_points, self.torso)
         return (*(name for name in optional if name is not None), *self.start.source_files)
 
-    def masked(self, camera: str) -> tuple[tuple[int, int], ...]:
+    def mask_stretches(self, camera: str) -> tuple[tuple[int, int], ...]:
         """Return the first and last frame of each stretch in which a camera is left out."""
         return tuple((mask.first, mask.last) for mask in self.mask if mask.camera == camera)
 
