@@ -94,7 +94,12 @@ def test_a_run_lacks_the_corrections_that_its_trial_got_since(run):
         f'{TRIAL}[[key]]\nframe = 9\nposition_m = [0, 0, 1]\n[[mask]]\ncamera = "a"\nfirst = 3\nlast = 4\n'
     )
     assert describe_pending(read_trial(trial), run) == (
-        "Not tracked yet: frame 9, a left out of 3 to 4. Tracking again goes over frames 1 to 11."
+        "Not tracked yet: frame 9; a left out of 3 to 4. Tracking again goes over frames 1 to 11."
+    )
+    record.write_text(json.dumps({"keys": {"0": "start", "5": "x"}, "masks": [{"camera": "a", "first": 3, "last": 3}]}))
+    trial.write_text(TRIAL)
+    assert describe_pending(read_trial(trial), run) == (
+        "Not tracked yet: frame 5, no longer corrected; a used again in 3. Tracking again goes over frames 1 to 11."
     )
     record.unlink()
     assert describe_pending(read_trial(trial), run) == ""

@@ -5,7 +5,15 @@ import pytest
 from airborne.errors import TrialError
 from airborne.io.text import parse_toml
 from airborne.studio.pages.mask_cameras import clip_frames
-from airborne.studio.trial_edits import with_cameras, with_clicks, with_key, with_mask, with_table, without_mask
+from airborne.studio.trial_edits import (
+    with_cameras,
+    with_clicks,
+    with_key,
+    with_mask,
+    with_table,
+    without_key,
+    without_mask,
+)
 
 TEXT = """# filmed on a Sunday
 name = "throw"
@@ -86,6 +94,14 @@ def test_masks_are_added_and_taken_away_beside_what_stands_there():
     assert parse_toml(without_mask(text, 0)) == parse_toml(TEXT)
     with pytest.raises(TrialError, match="the trial has 1 mask;"):
         without_mask(text, 1)
+
+
+def test_a_key_is_dropped_and_others_stay():
+    text = with_key(with_key(TEXT, 9, {"sd_m": 0.1}), 4, {"sd_m": 0.2})
+    assert parse_toml(without_key(text, 9)) == parse_toml(TEXT) | {"key": [{"frame": 4, "sd_m": 0.2}]}
+    assert parse_toml(without_key(without_key(text, 9), 4)) == parse_toml(TEXT)
+    with pytest.raises(TrialError, match="the trial has no key of frame 5;"):
+        without_key(text, 5)
 
 
 def test_a_new_table_stands_below_an_empty_line():

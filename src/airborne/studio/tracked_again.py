@@ -25,8 +25,10 @@ from airborne.tracking import Status
 from airborne.tracking.evidence import PoseEvidence
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
+from airborne.trial.masks import MaskTable
 from airborne.trial.pose_forms import BY_HAND
 
+_FAR_SDS = 3.0  # of a normal deviation, one in 370 is farther
 _MOST_KEYS = 2  # that are told, the worst first
 _LOST = "the pictures show no body near its key; undo it, or drag the body onto what they show, and track again"
 
@@ -76,15 +78,18 @@ def describe_pending(trial: Trial, run: Path) -> str:
     Raises AirborneError.
     """
     pending, index = pending_corrections(trial, run), run_rows(run).index
-    what = [name_frames(np.array(pending.keys))] if pending.keys else []
-    what += [f"{mask['camera']} left out of {name_stretch(mask['first'], mask['last'])}" for mask in pending.masks]
+    held = {key.frame for key in trial.key}
+    what = [f"frame {frame}{'' if frame in held else ', no longer corrected'}" for frame in pending.keys]
+    for mask in pending.masks:
+        verb = "left out of" if MaskTable(**mask) in trial.mask else "used again in"
+        what.append(f"{mask['camera']} {verb} {name_stretch(mask['first'], mask['last'])}")
     if not what:
         return ""
     touched = np.zeros(len(index), bool)
     for first, last in pending.stretches:
         touched |= (first < index) & (index < last)
     frames = name_frames(index[touched], trial.track.every) if touched.any() else "no frame of this run"
-    return f"Not tracked yet: {', '.join(what)}. Tracking again goes over {frames}."
+    return f"Not tracked yet: {'; '.join(what)}. Tracking again goes over {frames}."
 
 
 def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[str]:
@@ -99,7 +104,7 @@ def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[st
         own = key.model_copy(update={"detections": None})  # what was set by hand
         is_by_hand = key.model_fields_set & (BY_HAND | {"joints_m", "points_px"})
         far = _farthest(read_key(trial, own, model, rig=rig, facts=()), pose, rig) if is_by_hand else None
-        words = f"at frame {key.frame}{doubt}" + ("" if far is None else f" {far.words}")
+        words = f"at frame {key.frame}{doubt}" + ("" if far is None else f" {far.words}{far.advice}")
         told.append((0.0 if far is None else far.sds, words))
     told = [words for _, words in sorted(told, key=lambda each: -each[0])]
     more = len(told) - _MOST_KEYS
@@ -111,6 +116,11 @@ class _Miss(NamedTuple):
 
     sds: float
     words: str
+
+    @property
+    def advice(self) -> str:
+        """What to do where it is too far for chance."""
+        return ", as the pictures say otherwise: correct it in another camera too" if self.sds > _FAR_SDS else ""
 
 
 def _farthest(key: PoseEvidence, pose: Pose, rig: Rig) -> _Miss:

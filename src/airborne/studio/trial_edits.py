@@ -77,6 +77,20 @@ def with_key(text: str, frame: int, values: Mapping[str, Any]) -> str:
     return tomlkit.dumps(document)
 
 
+def without_key(text: str, frame: int) -> str:
+    """Return a trial's text without the [[key]] of a frame."""
+    document = _parse(text)
+    keys = document.get("key", [])
+    numbers = [number for number, each in enumerate(keys) if each.get("frame") == frame]
+    if not numbers:
+        raise TrialError(f"the trial has no key of frame {frame}; reload this page")
+    for number in reversed(numbers):
+        del keys[number]
+    if not keys:
+        del document["key"]
+    return tomlkit.dumps(document)
+
+
 def with_mask(text: str, camera: str, first: int, last: int) -> str:
     """Return a trial's text with a camera left out from the first to the last frame."""
     document = _parse(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from airborne.studio.runs import count_frames, count_rows, describe_progress, ru
 from airborne.studio.session import Session
 from airborne.studio.starts import POSE_COLOUR
 from airborne.studio.tracked_again import RunBefore, describe_pending, describe_tracked_again, name_frames
-from airborne.studio.trial_edits import with_clicks, with_key
+from airborne.studio.trial_edits import with_clicks, with_key, without_key
 from airborne.studio.view import CameraViews, Drag, Mark
 from airborne.trial.keys import KeyTable
 from airborne.trial.settings import KEY_METHODS
@@ -58,6 +59,19 @@ class Correction:
             self.switch = ui.switch("Correct", on_change=lambda: self.turn_to(self.frame))
         self.masks = MaskPanel(self.session, self.shown, lambda: self.frame, self._note_change)
         self.masks.area.bind_visibility_from(self.switch, "value")
+        with self.masks.area:
+            self.keys = ui.refreshable(self._list_keys)
+            self.keys()
+
+    def _list_keys(self) -> None:
+        for key in self.session.project().tables.get("key", []):
+            frame = int(key["frame"])
+            button = ui.button(f"frame {frame}  ✕", on_click=partial(self.drop, frame))
+            button.props("flat dense no-caps").tooltip("drop this correction")
+
+    def drop(self, frame: int) -> None:
+        """Take a frame's key out of the trial."""
+        self._edit(frame, lambda text: without_key(text, frame), f"correction of frame {frame} dropped", "")
 
     def build_watch(self) -> None:
         """Lay out the button that tracks again, and what there is to say: where the pictures do not shrink for it."""
@@ -72,7 +86,11 @@ class Correction:
             self._tracked = None
         self.again.set_visibility(self._tracked is None)
         self.hint = ui.label().classes("small")
-        self.hint.bind_visibility_from(self.switch, "value")
+        self._show_hint()
+
+    def _show_hint(self) -> None:
+        """Say how to correct until something is corrected: beside the scene there is little room."""
+        self.hint.set_visibility(bool(self.switch.value) and not (self.pending.text and self.hint.text == _HINT))
 
     def _show_pending(self) -> None:
         """Name the corrections that the run was tracked without, and what tracking again goes over."""
@@ -98,6 +116,7 @@ class Correction:
             pose, self.hand.colour, hint = self._pose(frame) if self.switch.value else (None, POSE_COLOUR, "")
             await self.hand.place_next(pose)
             self.hint.set_text(hint)
+            self._show_hint()
             self._show(frame)
 
     def _pose(self, frame: int) -> tuple[Pose | None, str, str]:
@@ -117,6 +136,7 @@ class Correction:
     async def reread(self) -> None:
         """Show what the trial holds now: undo or another window may have changed it."""
         self.masks.list.refresh()
+        self.keys.refresh()
         held = self._held()
         if held == self._seen:
             self._show(self.frame)
@@ -203,6 +223,7 @@ class Correction:
         """Say what was written, and offer to track again."""
         self._seen = self._held()
         self.watch.says.set_text(what)
+        self.keys.refresh()
         self._show_pending()
         self.again.set_visibility(True)
         self._show(self.frame)

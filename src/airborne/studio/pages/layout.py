@@ -54,6 +54,12 @@ _PRESS_BLUE = """(() => { // the last that is there, as Use comes after Find; a 
 })()"""
 
 
+_KEEP_FIELDS = """document.addEventListener("keydown", (event) => { // or the browser undoes what was typed last, too
+    const isTyping = event.target.matches("input:not([type=range]), textarea");
+    if (event.ctrlKey && ["z", "y"].includes(event.key) && !isTyping) event.preventDefault();
+})"""
+
+
 @asynccontextmanager
 async def page_frame(
     session: Session,
@@ -119,6 +125,7 @@ async def page_frame(
             guide()
             await look()
             await ui.context.client.connected()
+            ui.run_javascript(_KEEP_FIELDS)
             yield changed
 
 

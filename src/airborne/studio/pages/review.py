@@ -76,6 +76,7 @@ async def review_page(session: Session) -> None:
                     view, correction = await _show_run(session, shown, files, beside.value, frame())
                     files.changed.append(jumps.look)
                 jumps.view = view
+                view.on("frame", lambda: says.set_text(""), args=[])  # it was said of the frame before
                 changed[:] = [list_anew, correction.reread]
 
         with ui.element("div").classes("row-line"):

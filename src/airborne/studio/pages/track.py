@@ -104,7 +104,8 @@ class _Panel:
 
     @property
     def _curves(self) -> str:
-        return f"/curves/{quote(self._name)}?frames={self.n_done}"  # another address for each state of a run
+        state = f"frames={self.n_done}&ended={not self._is_running}"  # another address for each state of a run
+        return f"/curves/{quote(self._name)}?{state}"
 
     @property
     def _command(self) -> Command | None:
@@ -181,6 +182,7 @@ class _Panel:
         elif command is not None and command is not self.ended:
             self.ended = command
             self._say_end(command)
+            self._show_curves()  # with what the end adds to each deviation
         if n_done != self.n_done:
             is_first, self.n_done = self.n_done <= 0, n_done
             self.view.run_method("refresh")
