@@ -6,6 +6,7 @@ import pytest
 from airborne.constants import NORMAL_QUANTILE_975
 from airborne.evaluation import Series, analyse_agreement
 from airborne.evaluation.agreement import effective_number, limits_of_agreement, variance_components
+from airborne.evaluation.agreement_text import agreement_table
 from tests.support.tolerances import ROUNDTRIP, sampled
 
 
@@ -125,3 +126,10 @@ def test_of_single_measurements_of_several_individuals_the_limits_are_the_usual_
     result = analyse_agreement(series(difference, [f"jump {k}" for k in range(12)]))
     assert result.upper_limit.value - result.bias.value == pytest.approx(1.959964 * difference.std(ddof=1), rel=1e-6)
     assert np.isnan(result.within_sd)
+
+
+def test_a_table_says_of_how_many_moments_it_is_and_where_they_are_few():
+    rng = np.random.default_rng(8)
+    few, many = (agreement_table([analyse_agreement(series(rng.normal(size=n)))]) for n in (3, 300))
+    assert [text.splitlines()[1].split()[2] for text in (few, many)] == ["3", "300"]
+    assert "few moments: these numbers are rough" in few and "few" not in many

@@ -57,6 +57,7 @@ def test_whole_run_flipped_is_wrong_raw_and_right_modulo_symmetry():
     motion = motion_of(flight())
     result = compare_motion(replace(motion, R=motion.R @ HALF_TURN[1]), flight(), HALF_TURN)
     assert result.raw.geodesic_rms_deg == pytest.approx(180)
+    assert "turned to another pose that looks the same: see modulo symmetry" in result.describe()
     assert result.modulo_run.geodesic_rms_deg == pytest.approx(0, abs=ROUNDTRIP)
     assert result.modulo_frame.geodesic_rms_deg == pytest.approx(0, abs=ROUNDTRIP)
     assert result.n_flips == 0

@@ -1,7 +1,10 @@
 """The method, the last frame and the folder of the next run, chosen in the step Track; in a real browser."""
 
+import shutil
+
 from airborne.io.text import read_toml
 from airborne.trial.settings import PLAYERS_METHODS
+from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import write_run, write_trial
 from tests.support.studio import fork_studio, open_page, wait_for_frame
 
@@ -57,3 +60,15 @@ def test_a_run_is_kept_unless_it_is_to_be_replaced_and_a_name_is_refused_not_alt
         page.wait_for_function("() => !document.querySelector('[aria-label=\"folder of the run\"]').disabled")
         page.get_by_role("progressbar", name="progress").wait_for(state="hidden")
     assert (trial.parent / "results" / "joints.csv").read_bytes() == before
+
+
+def test_a_page_goes_on_once_what_comes_first_is_done(tmp_path):
+    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    points = folder / "control_points.csv"
+    text = points.read_text()
+    points.write_text(text.replace("5", "five", 1))
+    with fork_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/track?")) as page:
+        page.get_by_text("First comes Cameras: see the steps at the left.").wait_for()
+        assert "is not a number" in page.locator(".rail .says").nth(1).get_attribute("title")
+        points.write_text(text)
+        page.get_by_label("last frame").wait_for()

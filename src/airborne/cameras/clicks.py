@@ -71,13 +71,11 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
         names.append(row[key_column])
         cells = row[:key_column] + row[key_column + 1 :]
         where = f"{path.name}, row {line} ({key} '{row[key_column]}')"
-        values[number] = [
-            _number(cell, f"{where}, column {column}") for cell, column in zip(cells, columns, strict=True)
-        ]
+        values[number] = [_number(cell, where, column) for cell, column in zip(cells, columns, strict=True)]
     return tuple(names), columns, values
 
 
-def _number(cell: str, where: str) -> float:
+def _number(cell: str, where: str, column: str) -> float:
     if not cell or cell.lower() == "nan":
         return np.nan
     try:
@@ -85,5 +83,6 @@ def _number(cell: str, where: str) -> float:
     except ValueError:
         value = np.inf
     if not np.isfinite(value):
-        raise CalibrationError(f"{where}: '{cell}' is not a number; correct it, or leave it blank if unseen")
+        unseen = ", or leave it blank if unseen" if column.endswith(("_u", "_v")) else ""
+        raise CalibrationError(f"{where}, column {column}: '{cell}' is not a number; correct it{unseen}")
     return value

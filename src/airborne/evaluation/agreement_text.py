@@ -22,20 +22,24 @@ _REFERENCES = (
     "per individual. Stat Methods Med Res 22:630-642.",
 )
 
+_FEW = 10  # moments: of fewer, a standard deviation itself is unsure by a quarter, 1 / sqrt(2 (n - 1))
 _Row = TypeVar("_Row")
 _AGAINST, _BETWEEN = "Against ", "Between "  # how paragraphs of results begin
 
 
 def agreement_table(rows: Sequence[Agreement]) -> str:
-    """Return agreement as a short plain table."""
-    table = [("agreement", "bias", "95 % limits", "RMSE", "nRMSE", "ICC(A,1)", "SEM")]
+    """Return agreement as a short plain table; a line below it says where there are few moments."""
+    table = [("agreement", "n", "bias", "95 % limits", "RMSE", "nRMSE", "ICC(A,1)", "SEM")]
     for row in rows:
         limits = f"{_number(row.lower_limit.value)} to {_number(row.upper_limit.value)}"
         share = or_dash(row.nrmse_percent.value / 100, ".2%")
         icc = or_dash(row.icc.agreement.value, ".4f")
         name, errors = f"  {row.name} [{row.unit}]", (_number(row.bias.value), limits, _number(row.rmse.value))
-        table.append((name, *errors, share, icc, _number(row.sem.value)))
-    return "\n".join(align_columns(table, (16, 9, 19, 9, 8, 10, 9)))
+        table.append((name, str(row.n), *errors, share, icc, _number(row.sem.value)))
+    lines = align_columns(table, (16, 6, 9, 19, 9, 8, 10, 9))
+    if rows and min(row.n for row in rows) < _FEW:
+        lines.append("  few moments: these numbers are rough; agreement.csv holds the 95 % interval of each")
+    return "\n".join(lines)
 
 
 def repeatability_table(rows: Sequence[Repeatability]) -> str:

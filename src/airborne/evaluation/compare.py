@@ -21,6 +21,7 @@ from airborne.types import Array, Triple
 
 _SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
 _HARDLY_ANY = 0.2  # share within two sds; 0.95 is expected
+_OTHER_WAY = 10.0  # times nearer once turned to what looks the same: no noise does that
 _FAR_MM = 20_000.0  # beyond any error of a body in a hall
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
 
@@ -98,6 +99,7 @@ class MotionComparison:
         kinds = {"": self.raw}
         if self.n_symmetries > 1:
             kinds |= {" modulo symmetry, whole run": self.modulo_run, " modulo symmetry, by frame": self.modulo_frame}
+        is_turned = self.raw.geodesic_rms_deg > _OTHER_WAY * self.modulo_run.geodesic_rms_deg
         if all(errors == self.raw for errors in kinds.values()):
             kinds = {", raw and modulo symmetry" if len(kinds) > 1 else "": self.raw}
         for title, errors in kinds.items():
@@ -106,6 +108,8 @@ class MotionComparison:
             largest = (*errors.largest_deg, errors.geodesic_largest_deg)
             rows += _rows(("somersault", "tilt", "twist", "whole"), rms, largest)
         lines += align_columns(rows, (18, 9, 9))
+        if is_turned:
+            lines.append("the reference has the body turned to another pose that looks the same: see modulo symmetry")
         if self.n_singular:
             lines.append(f"{self.n_singular} frames near 90 degrees of tilt: their somersault and twist mean little")
         if self.n_flips:

@@ -71,8 +71,8 @@ DEFINITIONS = {
         "clock."
     ),
     "Body axes": (
-        "x to the subject's left, y to the back, z to the head, from the origin of the body's first segment (the "
-        "root). The position is that of the root's origin."
+        "A person's: x to the left, y to the back, z to the head; a thing's: those of its file. They begin at the "
+        "origin of the body's first segment (the root), whose position is the body's."
     ),
     "Somersault, tilt, twist": (
         "Successive turns about the body's x, then y, then z axis: R = Rx(somersault) Ry(tilt) Rz(twist) maps body "

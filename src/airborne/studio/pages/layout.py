@@ -189,11 +189,16 @@ def _example(here: str) -> ui.dialog:
 
 def name_missing_steps(session: Session, *needed: str) -> bool:
     """Tell which of the steps that this one needs come first, as they are not ready; return whether any is."""
-    missing = [step.name for step in steps(session.project()) if step.name in needed and step.state != "ready"]
+    missing = _missing_steps(session, needed)
     if missing:
         verb = "comes" if len(missing) == 1 else "come"
         ui.label(f"First {verb} {', '.join(missing)}: see the steps at the left.").classes("warn")
+        ui.timer(_LOOK_EVERY_S, lambda: _missing_steps(session, needed) or ui.navigate.reload())
     return bool(missing)
+
+
+def _missing_steps(session: Session, needed: Sequence[str]) -> list[str]:
+    return [step.name for step in steps(session.project()) if step.name in needed and step.state != "ready"]
 
 
 def name_outer_links(links: Sequence[str]) -> None:

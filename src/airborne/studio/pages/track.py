@@ -56,6 +56,7 @@ class _Panel:
     shown: ShownTrial
     settings: TrackSettingsBar
     n_done: int = -1  # frames of the run, when it was looked at last
+    is_finished: bool = False  # and whether it was, by whomever
     n_before: int = 0  # of them, when it was resumed
     ended: Command | None = None  # the run whose end was told
     curves: Curves | None = None  # once there are frames
@@ -104,7 +105,7 @@ class _Panel:
 
     @property
     def _curves(self) -> str:
-        state = f"frames={self.n_done}&ended={not self._is_running}"  # another address for each state of a run
+        state = f"frames={self.n_done}&finished={self.is_finished}"  # another address for each state of a run
         return f"/curves/{quote(self._name)}?{state}"
 
     @property
@@ -182,9 +183,10 @@ class _Panel:
         elif command is not None and command is not self.ended:
             self.ended = command
             self._say_end(command)
-            self._show_curves()  # with what the end adds to each deviation
-        if n_done != self.n_done:
-            is_first, self.n_done = self.n_done <= 0, n_done
+        run = find_run(self.session.folder, self._name)
+        is_finished = run is not None and (run / SUMMARY).is_file()
+        if (n_done, is_finished) != (self.n_done, self.is_finished):
+            is_first, self.n_done, self.is_finished = self.n_done <= 0, n_done, is_finished
             self.view.run_method("refresh")
             self._show_curves()
             if newest is not None and self._is_running:

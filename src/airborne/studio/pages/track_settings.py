@@ -48,7 +48,8 @@ class TrackSettingsBar:
         track, frame = self._trial.track, self._trial.start.frame
         self._method.set_value(track.method)
         self._last.set_value(min(self._n_images, track.stop or self._n_images) - 1)
-        self._first.set_text(f"from frame {frame}, the first pose's")
+        whose = "where the body is looked for first" if self._trial.start.find else "the first pose's"
+        self._first.set_text(f"from frame {frame}, {whose}")
 
     def _set_method(self) -> None:
         if self._method.value != self._trial.track.method:
