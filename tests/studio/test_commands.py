@@ -29,6 +29,8 @@ def test_two_commands_of_one_kind_say_each_its_own(tmp_path):
     assert "no_other" in commands[1].complaint()
     commands[0]._log.write_text("airborne: compiling\ntracking cross: a throw: 3 of 34\n")
     assert (commands[0].how_far(), commands[0].n_done()) == ("3 of 34", 3)
+    commands[0]._log.write_text("looking for the start: 30 of 34\n")
+    assert (commands[0].how_far(), commands[0].n_done()) == ("30 of 34", 0)  # none of these is tracked
     commands[0]._log.write_text("airborne: compiling: up to a minute\n")
     assert (commands[0].how_far(), commands[0].n_done()) == ("compiling: up to a minute", 0)
 
@@ -60,6 +62,10 @@ def test_a_run_that_a_killed_studio_left_is_found_again_and_can_be_stopped(tmp_p
     assert (command.is_running, command.code) == (False, 1)
     assert command.complaint() == "it ended early; go on"
     (run / SUMMARY).touch()
+    with subprocess.Popen([sys.executable, "-c", _WRITES, str(run)], stdout=subprocess.PIPE, text=True) as process:
+        process.stdout.readline()  # something is added to a run that is finished
+        assert Session(tmp_path, tmp_path / "trial.toml").commands == {}
+        process.kill()
     assert (command.code, command.output()) == (0, "ended\n")
     (run / LOCK).write_text("process 999999999 on another since 2026-01-01 00:00:00")
     assert Session(tmp_path, tmp_path / "trial.toml").commands == {}

@@ -101,6 +101,9 @@ def test_a_run_lacks_the_corrections_that_its_trial_got_since(run):
     assert describe_pending(read_trial(trial), run) == (
         "Not tracked yet: frame 5, no longer corrected; a used again in 3. Tracking again goes over frames 1 to 11."
     )
+    record.write_text(json.dumps({"keys": {"2": "start"}, "masks": []}))
+    trial.write_text("\n".join(line for line in TRIAL.splitlines() if not line.startswith("start")))
+    assert describe_pending(read_trial(trial), run) == ""  # where it began was found
     record.unlink()
     assert describe_pending(read_trial(trial), run) == ""
 

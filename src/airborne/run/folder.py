@@ -208,6 +208,9 @@ def pending_corrections(trial: Trial, folder: Path) -> PendingCorrections:
         return PendingCorrections([], [], [])
     now = json.loads(json.dumps(_corrections(trial)))
     recorded = _with_keys(read_record(folder / RUN_RECORD), now)
+    if trial.start.find:  # as it was found then
+        found = {frame: digest for frame, digest in recorded["keys"].items() if digest == START}
+        now["keys"] = found | {frame: digest for frame, digest in now["keys"].items() if digest != START}
     old, new = recorded["keys"], now["keys"]
     keys = sorted(int(frame) for frame in {*old, *new} if old.get(frame) != new.get(frame))
     return PendingCorrections(keys, _mask_changes(recorded, now), stretches_between(recorded, now))

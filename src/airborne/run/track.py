@@ -59,6 +59,7 @@ def track_trial(
     first_frame: bool = False,
     take: int | None = None,
     progress: Progress | None = None,
+    find_progress: Progress | None = None,
 ) -> TrackResult:
     """Track a trial, a body or players, and write the results into a folder.
 
@@ -67,7 +68,8 @@ def track_trial(
     `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than fall
     behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
     `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
-    `take` chooses one of the poses that were found, from 1, where the trial leaves its start to be found.
+    `take` chooses one of the poses that were found, from 1, where the trial leaves its start to be found;
+    `find_progress`, by default `progress`, is called as the videos are looked through for it.
     Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
     """
     if live and resume:
@@ -88,7 +90,7 @@ def track_trial(
         raise ResultError("a live run looks for nobody; give [[start.player]] tables")
     if trial.start.find:
         find = find_players_start if trial.has_players else find_start
-        found = find(trial, folder, take=take, progress=progress)
+        found = find(trial, folder, take=take, progress=find_progress or progress)
         trial = found.trial
     elif take is not None:
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")

@@ -92,8 +92,8 @@ class Command:
         return re.sub(r"^.*: (?=\d+ of \w+$)", "", self.progress())
 
     def n_done(self) -> int:
-        """Return how many frames, or whatever it counts, it said last that it has done; 0 before it said so."""
-        found = re.search(r"(\d+) of \d+$", self.progress())
+        """Return how many frames it said last that it has tracked; 0 before it said so."""
+        found = re.search(r"^tracking .*: (\d+) of \d+$", self.progress())
         return int(found[1]) if found else 0
 
     def has_written(self, path: Path) -> bool:
@@ -150,7 +150,8 @@ def find_tracking(folder: Path, trial: Path) -> Command | None:
     """Return the command that tracks into a run of the folder and is not ours, where one does."""
     for lock in sorted(folder.glob(f"*/{LOCK}")):
         run, number = lock.parent, find_writer(lock.parent)
-        if number is not None and run.name != FOLDER and not run.is_symlink():
+        is_tracked = number != os.getpid() and not (run / SUMMARY).is_file()  # else what is finished is added to
+        if number is not None and is_tracked and run.name != FOLDER and not run.is_symlink():
             with suppress(FileNotFoundError):  # it has just ended
                 return Command(["track", trial.name, "-o", run.name], folder, OtherProcess(run, number))
     return None

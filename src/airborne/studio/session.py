@@ -35,8 +35,7 @@ class Session:
         self.pictures, self.editor = Pictures(folder / FOLDER), Editor(folder)
         self.place = read_place(folder)
         self.commands: dict[str, Command] = {}  # that were started here, by what they do
-        if (tracking := find_tracking(folder, path)) is not None:
-            self.commands["track"] = tracking
+        self.watch_tracking()
         self._known: dict[str, tuple[Hashable, Any]] = {}
         self._lock = Lock()
 
@@ -44,6 +43,11 @@ class Session:
     def frame(self) -> int:
         """The frame that was in view last, in any window: a page opens there; what is done to one is its view's."""
         return self.place.frame
+
+    def watch_tracking(self) -> None:
+        """Look for a process that was not started here and tracks into a run of the folder; it can be stopped here."""
+        if (tracking := find_tracking(self.folder, self.path)) is not None:
+            self.commands["track"] = tracking
 
     def go(self, *, page: str | None = None, frame: int | None = None) -> None:
         """Note the page, or the frame, in view."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -17,7 +17,7 @@ from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.ghosts import ghost_of
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import in_thread, show_errors
-from airborne.studio.pages.mask_cameras import MaskPanel
+from airborne.studio.pages.mask_cameras import Entry, MaskPanel
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.pages.run_watch import RunWatch
 from airborne.studio.pictures import ShownTrial
@@ -57,17 +57,13 @@ class Correction:
         """Lay out the switch, and what leaves a camera out."""
         with ui.element("div").classes("row-line"):
             self.switch = ui.switch("Correct", on_change=lambda: self.turn_to(self.frame))
-        self.masks = MaskPanel(self.session, self.shown, lambda: self.frame, self._note_change)
+        self.masks = MaskPanel(self.session, self.shown, lambda: self.frame, self._note_change, self._keys)
         self.masks.area.bind_visibility_from(self.switch, "value")
-        with self.masks.area:
-            self.keys = ui.refreshable(self._list_keys)
-            self.keys()
 
-    def _list_keys(self) -> None:
+    def _keys(self) -> Iterator[Entry]:
         for key in self.session.project().tables.get("key", []):
-            frame = int(key["frame"])
-            button = ui.button(f"frame {frame}  ✕", on_click=partial(self.drop, frame))
-            button.props("flat dense no-caps").tooltip("drop this correction")
+            if isinstance(key, dict) and isinstance(frame := key.get("frame"), int):
+                yield Entry(f"frame {frame}", "drop this correction", partial(self.drop, frame))
 
     def drop(self, frame: int) -> None:
         """Take a frame's key out of the trial."""
@@ -95,7 +91,7 @@ class Correction:
     def _show_pending(self) -> None:
         """Name the corrections that the run was tracked without, and what tracking again goes over."""
         project = self.session.project()
-        is_whole = not project.mistake and bool(project.table("start")) and not self.watch.is_running
+        is_whole = not project.mistake and not self.watch.is_running
         with show_errors():
             self.pending.set_text(describe_pending(project.trial(), self.folder) if is_whole else "")
 
@@ -136,7 +132,6 @@ class Correction:
     async def reread(self) -> None:
         """Show what the trial holds now: undo or another window may have changed it."""
         self.masks.list.refresh()
-        self.keys.refresh()
         held = self._held()
         if held == self._seen:
             self._show(self.frame)
@@ -223,7 +218,7 @@ class Correction:
         """Say what was written, and offer to track again."""
         self._seen = self._held()
         self.watch.says.set_text(what)
-        self.keys.refresh()
+        self.masks.list.refresh()
         self._show_pending()
         self.again.set_visibility(True)
         self._show(self.frame)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from nicegui import ui
@@ -22,14 +22,34 @@ _VEIL = "#16191dcc"  # over a picture that is left out
 _KEYS = {"camera", "first", "last"}
 
 
+_MOST_IN_ROW = 2  # at 1280 px; below a second row, the pictures would be small
+
+
+class Entry(NamedTuple):
+    """A correction on the list."""
+
+    text: str
+    tip: str  # what a click does
+    remove: Callable[[], None]
+
+
 class MaskPanel:
     """One window's row of what is left out."""
 
     def __init__(
-        self, session: Session, shown: ShownTrial, frame_of: Callable[[], int], on_change: Callable[[str], None]
+        self,
+        session: Session,
+        shown: ShownTrial,
+        frame_of: Callable[[], int],
+        on_change: Callable[[str], None],
+        others: Callable[[], Iterable[Entry]] = tuple,
     ) -> None:
-        """Lay it out; `frame_of` says which frame is in view, `on_change` is called with what was written."""
+        """Lay it out; `frame_of` says which frame is in view, `on_change` is called with what was written.
+
+        `others` returns what is listed before the masks.
+        """
         self.session, self.shown, self._frame_of, self._on_change = session, shown, frame_of, on_change
+        self._others = others
         with ui.element("div").classes("row-line") as self.area:
             self.camera = ui.select(shown.names, label="camera", value=shown.names[0])
             self.camera.props("outlined dense options-dense").style("min-width: 150px")
@@ -80,10 +100,19 @@ class MaskPanel:
         self._on_change(what)
 
     def _list(self) -> None:
+        """Show what can be taken back: in the row, or where it is much, on a list of its own."""
+        entries = list(self._others())
         for number, mask in self.masks:
-            text = f"{mask['camera']}: {name_stretch(mask['first'], mask['last'])}  ✕"
-            button = ui.button(text, on_click=partial(self.remove, number, str(mask["camera"])))
-            button.props("flat dense no-caps").tooltip("use it again")
+            text = f"{mask['camera']}: {name_stretch(mask['first'], mask['last'])}"
+            entries.append(Entry(text, "use it again", partial(self.remove, number, str(mask["camera"]))))
+        if len(entries) <= _MOST_IN_ROW:
+            for each in entries:
+                button = ui.button(f"{each.text}  ✕", on_click=each.remove).props("flat dense no-caps")
+                button.tooltip(each.tip)
+            return
+        with ui.dropdown_button(f"{len(entries)} corrections").props("flat dense no-caps"):
+            for each in entries:
+                ui.item(f"{each.text}  ✕", on_click=each.remove).tooltip(each.tip)
 
 
 class PlayersMasks:

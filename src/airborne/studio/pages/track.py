@@ -61,6 +61,7 @@ class _Panel:
     ended: Command | None = None  # the run whose end was told
     curves: Curves | None = None  # once there are frames
     _was_running: bool = False
+    _begun_s: float = 0.0  # after which the first frame was tracked
     _problem: str = ""  # of the folder's name
 
     def build(self) -> None:
@@ -175,6 +176,9 @@ class _Panel:
     async def look(self) -> None:
         """Show how far the run is, and its newest frame unless the user looks at another."""
         n_done, newest = await in_thread(self._count, says="")
+        if not self._is_running:  # a terminal, or another studio, may have begun one
+            with show_errors():
+                self.session.watch_tracking()
         command = self._command
         if self._is_running != self._was_running:  # another window has started it, or it has ended
             self._show_buttons()
@@ -204,10 +208,14 @@ class _Panel:
 
     def _say_progress(self, command: Command, n_rows: int) -> None:
         n_frames, n_done, left = self.settings.n_frames, max(n_rows, command.n_done()), ""
-        if (n_own := n_done - self.n_before) > 2 and n_done < n_frames:
-            left = f", about {command.seconds / n_own * (n_frames - n_done):.0f} s left"
+        if n_done <= self.n_before:
+            self._begun_s = command.seconds  # what goes before, opening videos and looking for the start, is no pace
+        elif (n_own := n_done - self.n_before) > 2 and n_done < n_frames:
+            left = f", about {(command.seconds - self._begun_s) / n_own * (n_frames - n_done):.0f} s left"
         self.bar.value = n_done / max(n_frames, 1)
-        self.says.text = f"{describe_progress(n_done, n_frames)}, {command.seconds:.0f} s{left}"
+        is_looking = not n_done and command.progress().startswith("looking")
+        stage = command.progress() if is_looking else describe_progress(n_done, n_frames)
+        self.says.text = f"{stage}, {command.seconds:.0f} s{left}"
 
     def _say_end(self, command: Command) -> None:
         if command.code == 0:
