@@ -61,6 +61,8 @@ def test_a_run_that_a_killed_studio_left_is_found_again_and_can_be_stopped(tmp_p
         assert process.wait() != 0
     assert (command.is_running, command.code) == (False, 1)
     assert command.complaint() == "it ended early; go on"
+    assert not run.exists()  # as nothing was written
+    run.mkdir()
     (run / SUMMARY).touch()
     with subprocess.Popen([sys.executable, "-c", _WRITES, str(run)], stdout=subprocess.PIPE, text=True) as process:
         process.stdout.readline()  # something is added to a run that is finished

@@ -25,11 +25,12 @@ def find_command(
 
     from airborne.run.find import find_start
     from airborne.run.find_players import find_players_start
+    from airborne.run.folder import open_results
     from airborne.trial.file import read_trial
 
     checked = read_trial(trial)
     find = find_players_start if checked.has_players else find_start
-    with progress(f"looking for the {'players' if checked.has_players else 'body'}") as report:
+    with open_results(output), progress(f"looking for the {'players' if checked.has_players else 'body'}") as report:
         found = find(checked, output, take=take, progress=report)
     if as_json:
         print(json.dumps({**found.start, "probability": found.finding.candidates[0].probability, "note": found.note}))

@@ -6,7 +6,7 @@ import os
 import re
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 
@@ -35,9 +35,10 @@ class InUseError(ResultError):
 def sole_writer(folder: Path, address: str = "") -> Iterator[None]:
     """Make a folder and be the only one that writes into it; raises InUseError where another process does.
 
-    That one is told which process has it, since when, and the `address` where it is found.
+    That one is told which process has it, since when, and the `address` where it is found. A folder
+    that was not there and stays empty is removed again.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    is_new = not folder.exists()
     file = _lock(folder)
     holder = f"process {os.getpid()} on {socket.gethostname()} since {datetime.now():%F %T}"
     try:
@@ -47,6 +48,9 @@ def sole_writer(folder: Path, address: str = "") -> Iterator[None]:
     finally:
         (folder / LOCK).unlink(missing_ok=True)
         os.close(file)
+        if is_new:
+            with suppress(OSError):  # something is in it
+                folder.rmdir()
 
 
 def find_writer(folder: Path) -> int | None:
@@ -63,10 +67,14 @@ def find_writer(folder: Path) -> int | None:
 
 
 def _lock(folder: Path) -> int:
-    """Return the locked file, open; one that its last holder has just removed is made anew."""
+    """Return the locked file, open, in a folder made if need be; what its last holder has just removed is made anew."""
     path = folder / LOCK
     while True:
-        file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0))
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0))
+        except FileNotFoundError:  # its last holder has just removed the folder
+            continue
         try:
             if fcntl is not None:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -15,8 +15,8 @@ from airborne.body import BodyModel, Pose
 from airborne.errors import TrialError, UndecidedError
 from airborne.export import write_json
 from airborne.geometry.rotations import angles_from_matrix
+from airborne.io.folder_lock import refuse_links
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
-from airborne.run.folder import open_results
 from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
 from airborne.tracking.first_pose.candidates import StartSearch, find_thing
@@ -67,7 +67,8 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     """Find the start of a trial that says nothing of it: the earliest frame from which the body can be followed.
 
     Where the pictures do not decide between poses, candidates.json and a picture of them are written into `folder` and
-    UndecidedError is raised; `take` chooses one of them, from 1. Raises TrialError where nothing can be found.
+    UndecidedError is raised; `take` chooses one of them, from 1. Whoever calls it is the folder's `sole_writer`. Raises
+    TrialError where nothing can be found.
     """
     model = trial.model()
     if len(trial.camera) < 2:
@@ -142,18 +143,24 @@ def take_candidate(trial: Trial, finding: AnySearch, number: int) -> AnySearch:
     return replace(finding, candidates=(chosen, *(each for each in finding.candidates if each is not chosen)))
 
 
+def open_candidates(folder: Path) -> None:
+    """Make the folder into which candidates are written. Raises ResultError for links that lead out of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    refuse_links(folder)
+
+
 def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path) -> UndecidedError:
     """Write the candidates and return the error that names them."""
     from airborne.export.finding import draw_candidates
 
     frame, best = finding.moment.frames.index, finding.candidates[0]
-    with open_results(folder):
-        write_json(folder / CANDIDATES, _describe(model, finding))
-        draw_candidates(
-            folder / CANDIDATES_PICTURE,
-            finding.moment,
-            [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
-        )
+    open_candidates(folder)
+    write_json(folder / CANDIDATES, _describe(model, finding))
+    draw_candidates(
+        folder / CANDIDATES_PICTURE,
+        finding.moment,
+        [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
+    )
     if not best.is_plausible:
         reason = (
             f"no pose agrees with what moves in frame {frame} (of the likeliest, {best.precision:.0%} of the outline "

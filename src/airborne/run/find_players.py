@@ -11,8 +11,7 @@ from airborne.errors import TrialError, UndecidedError
 from airborne.export import write_json
 from airborne.export.finding import draw_player_candidates
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
-from airborne.run.find import describe_probability, frames_up_to, look_through, take_candidate
-from airborne.run.folder import open_results
+from airborne.run.find import describe_probability, frames_up_to, look_through, open_candidates, take_candidate
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.first_pose.players import PlayersSearch, find_players
@@ -72,13 +71,13 @@ def find_players_start(
 def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> UndecidedError:
     """Write the candidates and return the error that names them."""
     frame, best = finding.frames.index, finding.candidates[0]
-    with open_results(folder):
-        write_json(folder / CANDIDATES, _describe(finding))
-        draw_player_candidates(
-            folder / CANDIDATES_PICTURE,
-            finding.frames,
-            [(f"{each.probability:.0%}", [player.state for player in each.players]) for each in finding.candidates],
-        )
+    open_candidates(folder)
+    write_json(folder / CANDIDATES, _describe(finding))
+    draw_player_candidates(
+        folder / CANDIDATES_PICTURE,
+        finding.frames,
+        [(f"{each.probability:.0%}", [player.state for player in each.players]) for each in finding.candidates],
+    )
     if best.is_plausible:
         n = len(finding.candidates)
         reason = f"who stands there in frame {frame}, and how; the likeliest of {n} is right by {best.probability:.0%}"

@@ -84,21 +84,21 @@ def track_trial(
         raise ResultError("a run is either resumed or overwritten; give one of --resume and --overwrite")
     if not live:
         refuse_same_files(trial)
-    started_s = time.monotonic()
-    found: FoundStart | FoundPlayers | None = None
     if live and trial.start.find:
         raise ResultError("a live run looks for nobody; give [[start.player]] tables")
-    if trial.start.find:
-        find = find_players_start if trial.has_players else find_start
-        found = find(trial, folder, take=take, progress=find_progress or progress)
-        trial = found.trial
-    elif take is not None:
+    if take is not None and not trial.start.find:
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")
-    if first_frame:
-        trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
-    drawn = None if not pictures else "stills" if first_frame else "videos"
-    options = _Options(folder, started_s, resume, overwrite, live, drawn, progress)
-    with ExitStack() as stack:
+    started_s = time.monotonic()
+    found: FoundStart | FoundPlayers | None = None
+    with sole_writer(folder), ExitStack() as stack:  # from the beginning: to find the start takes its time
+        if trial.start.find:
+            find = find_players_start if trial.has_players else find_start
+            found = find(trial, folder, take=take, progress=find_progress or progress)
+            trial = found.trial
+        if first_frame:
+            trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
+        drawn = None if not pictures else "stills" if first_frame else "videos"
+        options = _Options(folder, started_s, resume, overwrite, live, drawn, progress)
         facts = None if found is None else found.facts
         if trial.has_players:
             opened = _open_live(trial, stack, progress) if live else open_trial(trial, facts)
@@ -123,11 +123,6 @@ class _Options:
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
-    with sole_writer(options.folder):
-        return _run_alone(subject, options, connection)
-
-
-def _run_alone(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     folder, recording = options.folder, subject.recording
     identity = run_identity(subject.trial, live=options.live)
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
