@@ -116,6 +116,10 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back_of_the_run_that_is_chosen(f
         page.get_by_role("switch", name="Leave cameras out").click()
         page.get_by_role("button", name="Leave it out").click()
         page.get_by_text("left out of frame 11; players are tracked again from the start").wait_for()
+        page.get_by_label("camera").click()
+        page.get_by_role("option").last.click()
+        page.get_by_role("button", name="Leave it out").click()
+        page.get_by_text("left out of frame 11; no camera is left in frame 11; players are tracked again").wait_for()
         choose_run(page, "person")
         page.get_by_text("reading the run").first.wait_for()
         page.locator("h1").click()  # out of the list

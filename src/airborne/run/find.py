@@ -12,7 +12,7 @@ import numpy as np
 
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene
 from airborne.body import BodyModel, Pose
-from airborne.errors import TrialError, UndecidedError
+from airborne.errors import TrialError, UndecidedError, count
 from airborne.export import write_json
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.io.folder_lock import refuse_links
@@ -76,9 +76,11 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     recording, facts, sample = look_through(trial, progress)
     scenes = empty_scenes(sample)
     if not scenes:
+        n_seen = sum(any(view is not None for view in frames.views) for frames in sample)
+        masked = ", as [[mask]] leaves all cameras out of others" if trial.mask and n_seen < len(sample) else ""
         raise TrialError(
-            f"{trial.name}: {len(sample)} frames are too few to tell the empty scene, {FEWEST_PICTURES} at least; "
-            "give the pose under [start]"
+            f"{trial.name}: {count(n_seen, 'frame')} with images{masked}: too few to tell the empty scene, "
+            f"{FEWEST_PICTURES} at least; give the pose under [start]"
         )
     search = find_person if model.has_joints else find_thing
     finding = search(model, look(sample, scenes))

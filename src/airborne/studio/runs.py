@@ -75,6 +75,12 @@ def _read_players(run: Path, stamp: Any) -> PlayersMotion:
     return read_players_run(run)
 
 
+def name_of_file(run: Path, name: str, within: str = "") -> str:
+    """Return the name of a file `within` a run's folder; one that is older was made of the run before, and says so."""
+    written_s = max(((run / table).stat().st_mtime for table in (MOTION, JOINTS) if (run / table).is_file()), default=0)
+    return f"{name} (of the run before)" if (run / within / name).stat().st_mtime < written_s else name
+
+
 def count_frames(trial: Trial, n_images: int) -> int:
     """Return how many frames a run of a trial has in all; its videos have this many."""
     return len(_frames_of(trial, n_images))

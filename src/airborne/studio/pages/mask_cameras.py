@@ -11,7 +11,7 @@ from nicegui import ui
 
 from airborne.errors import TrialError
 from airborne.export.methods_text import name_stretch
-from airborne.studio.pages.layout import show_errors
+from airborne.studio.pages.layout import complain, show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.tracked_again import name_frames
@@ -82,12 +82,26 @@ class MaskPanel:
     def add(self) -> None:
         """Leave the chosen camera out; without frames, of the one in view."""
         numbers = (self.first.value, self.last.value)
+        if numbers.count(None) == 1:
+            complain("give both frames, or neither for the one in view")
+            return
         first, last = (self._frame_of() if number is None else int(number) for number in numbers)
         camera = str(self.camera.value)
         with show_errors():
             last, note = clip_frames(first, last, self._end)
             what = f"{camera} left out of {name_frames(np.arange(first, last + 1))}{note}"
-            self._edit(lambda text: with_mask(text, camera, first, last), what)
+            self._edit(lambda text: with_mask(text, camera, first, last), what + self._warn_blind(camera, first, last))
+
+    def _warn_blind(self, camera: str, first: int, last: int) -> str:
+        """Say in which of these frames no camera is left once this one is left out; nothing where one is."""
+        masks = [(mask["camera"], range(mask["first"], mask["last"] + 1)) for _, mask in self.masks]
+        others = [name for name in self.shown.names if name != camera]
+        is_out = [
+            all(any(frame in out for name, out in masks if name == other) for other in others)
+            for frame in range(first, last + 1)
+        ]
+        blind = first + np.flatnonzero(is_out)
+        return f"; no camera is left in {name_frames(blind)}" if len(blind) else ""
 
     def remove(self, number: int, camera: str) -> None:
         """Use a camera again."""

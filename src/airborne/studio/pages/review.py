@@ -73,10 +73,11 @@ async def review_page(session: Session) -> None:
                 content.clear()
                 with content:
                     files = RunWatch(folder)
-                    view, correction = await _show_run(session, shown, files, beside.value, frame())
+                    view, correction = await _show_run(
+                        session, shown, files, beside.value, frame(), on_turn=lambda: says.set_text("")
+                    )
                     files.changed.append(jumps.look)
                 jumps.view = view
-                view.on("frame", lambda: says.set_text(""), args=[])  # it was said of the frame before
                 changed[:] = [list_anew, correction.reread]
 
         with ui.element("div").classes("row-line"):
@@ -104,11 +105,11 @@ async def _blame(session: Session, shown: ShownTrial, folder: Path, frame: int, 
 
 
 async def _show_run(
-    session: Session, shown: ShownTrial, files: RunWatch, beside: str, frame: int
+    session: Session, shown: ShownTrial, files: RunWatch, beside: str, frame: int, *, on_turn: Callable[[], None]
 ) -> tuple[CameraViews, Correction | PlayersMasks]:
     """Lay a run out, at a frame, and let what shows it be shown anew when its files change.
 
-    Return its pictures, and what corrects it.
+    Return its pictures, and what corrects it. `on_turn` is called when another frame is shown.
     """
     folder = files.folder
     bodies: list[Callable[[int], Any]] = []
@@ -126,6 +127,7 @@ async def _show_run(
 
     async def turn_to(frame: int) -> None:
         session.go(frame=frame)
+        on_turn()
         with show_errors():
             for show in bodies:
                 if isawaitable(result := show(frame)):
