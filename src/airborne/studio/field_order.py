@@ -1,4 +1,4 @@
-"""Which field of an interlaced picture is the first: both answers as pictures, the right one with smaller teeth."""
+"""Which field of an interlaced picture is the first: both answers as pictures, the correct one with smaller teeth."""
 
 from __future__ import annotations
 

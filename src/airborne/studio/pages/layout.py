@@ -37,7 +37,7 @@ _KEYS = {
     "R": "the next frame in which one of them is lost, or a joint is in no picture; with Shift the one before",
     "E": "both pictures show the same event, where cameras are synchronised by hand",
     "N P": "choose the next point, the one before",
-    "Delete": "remove the chosen click",
+    "Delete": "remove the chosen click, where points are clicked",
     "Ctrl+Enter": "press the page's blue button: Use, Track, Track again; of several cards that in which the cursor is",
     "Esc": "let go of the chosen mark",
     "Ctrl+Z, Ctrl+Y": "undo, redo",
@@ -55,8 +55,7 @@ _PRESS_BLUE = """(() => { // the last that is there, as Use comes after Find; a 
 
 
 _KEEP_FIELDS = """document.addEventListener("keydown", (event) => { // or the browser undoes what was typed last, too
-    const isTyping = event.target.matches("input:not([type=range]), textarea");
-    if (event.ctrlKey && ["z", "y"].includes(event.key) && !isTyping) event.preventDefault();
+    if (event.ctrlKey && /[zy]/.test(event.key) && !event.target.matches("input, textarea")) event.preventDefault();
 })"""
 
 
@@ -169,21 +168,26 @@ def _guide(session: Session, here: str, page: str) -> None:
 
 def _sheet() -> ui.dialog:
     with ui.dialog().props("aria-label=keys") as dialog, ui.card():
-        ui.html("<h2>Keys</h2>", sanitize=False)
+        _dialog_head(dialog, "Keys")
         rows = "".join(f"<tr><th><kbd>{key}</kbd></th><td>{what}</td></tr>" for key, what in _KEYS.items())
         ui.html(f'<table class="plain">{rows}</table>', sanitize=False)
-        ui.button("Close", on_click=dialog.close).props("flat")
     return dialog
+
+
+def _dialog_head(dialog: ui.dialog, title: str) -> None:
+    """Head a dialog that may be longer than the window with its title and the button that closes it."""
+    with ui.element("div").classes("row-line").style("width: 100%; justify-content: space-between"):
+        ui.html(f"<h2>{title}</h2>", sanitize=False)
+        ui.button("Close", on_click=dialog.close).props("flat dense")
 
 
 def _example(here: str) -> ui.dialog:
     """Lay out a picture of a step that is done well: of the thrown cross."""
     with ui.dialog().props('aria-label="an example"') as dialog, ui.card().style("max-width: min(1120px, 94vw)"):
-        ui.html(f"<h2>{here}: the thrown cross</h2>", sanitize=False)
+        _dialog_head(dialog, f"{here}: the thrown cross")
         name = here.lower().replace(" ", "_")
         picture = ui.element("img").props(f"src=/example/{name}.jpg loading=lazy").style("width: 100%; height: auto")
         picture._props["alt"] = f"the step {here}, done for the thrown cross"
-        ui.button("Close", on_click=dialog.close).props("flat")
     return dialog
 
 

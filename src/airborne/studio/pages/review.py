@@ -105,7 +105,7 @@ async def _blame(session: Session, shown: ShownTrial, folder: Path, frame: int, 
 
 
 async def _show_run(
-    session: Session, shown: ShownTrial, files: RunWatch, beside: str, frame: int, *, on_turn: Callable[[], None]
+    session: Session, shown: ShownTrial, files: RunWatch, beside: str, frame: int, *, on_turn: Callable[[], Any]
 ) -> tuple[CameraViews, Correction | PlayersMasks]:
     """Lay a run out, at a frame, and let what shows it be shown anew when its files change.
 

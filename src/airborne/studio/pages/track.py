@@ -253,4 +253,5 @@ class _Panel:
         self.again.set_visibility(not is_running and is_begun)
         if problem or self._problem:
             self.says.text = problem
+            self.says.classes("warn" if problem else "soft", remove="soft" if problem else "warn")
         self._problem = problem

@@ -56,8 +56,10 @@ class TrackSettingsBar:
             self._set("method", self._method.value, f"method {self._method.value}")
 
     def _set_last(self, text: str) -> None:
-        frame, last = self._trial.start.frame, int(float(text)) if text else self._n_images - 1
+        frame, number = self._trial.start.frame, float(text) if text else self._n_images - 1
         with show_errors():
+            if number != (last := int(number)):
+                raise TrialError(f"{number:g} is no frame; give a whole number")
             if last < frame:
                 raise TrialError(f"the first pose is that of frame {frame}; give a last frame from there on")
             if last >= self._n_images:

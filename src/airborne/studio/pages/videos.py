@@ -126,7 +126,7 @@ def _show_orders(choice: _Choice, facts: VideoFacts) -> None:
     """Show both orders of a file that is read by fields; the right one is obvious where something moves."""
     if _order(facts, choice.fields) == "progressive":
         return
-    ui.label("Two neighbouring fields by either order: the right one has the smaller teeth.").classes("soft small")
+    ui.label("Two neighbouring fields by either order: the correct one has the smaller teeth.").classes("soft small")
     with ui.element("div").classes("row-line"):
         for order in ORDERS:
             with ui.element("figure").style("margin: 0; width: 47%"):
