@@ -104,7 +104,7 @@ def test_a_camera_is_left_out_of_the_frames_of_a_mask_which_are_tracked_again(cr
     assert found == {5, 6, 7}
     assert summary["masks"] == [{"camera": "cam2", "first": 5, "last": 6}]
     assert views == {5: [True, False, True], 6: [True, False, True], 7: [True, True, True]}
-    assert "cam2: no image at 2 of 13 frames: frames 5 to 6" in summary["events"]
+    assert not any("no image" in each for each in summary["events"])  # as it was the mask
     assert all(poses(run)[frame] == before[frame] for frame in (*range(5), *range(8, LAST)))
     found.clear()
     track_trial(cross(*keys), run, resume=True, pictures=False)
