@@ -92,9 +92,14 @@ def write_trial(folder: Path, second: Path, names: list[str], seconds: int) -> N
     repeat_clip(second, folder / f"{names[0]}.mp4", seconds)
     for name in names[1:]:
         os.link(folder / f"{names[0]}.mp4", folder / f"{name}.mp4")
-    cameras = "".join(f'[[camera]]\nname = "{name}"\nvideo = "{name}.mp4"\n' for name in names)
+    around = [[4 * np.cos(k), 4 * np.sin(k), 1.5] for k in range(len(names))]
+    cameras = [
+        camera_looking_at(*each, [0, 0, 1.1], focal_px=1500, size=SIZE) for each in zip(names, around, strict=True)
+    ]
+    write_pose2sim(folder / "calib.toml", Rig(tuple(cameras)))
+    tables = "".join(f'[[camera]]\nname = "{name}"\nvideo = "{name}.mp4"\n' for name in names)
     (folder / "trial.toml").write_text(
-        f'name = "waiting"\ncalibration = {{ file = "calib.toml" }}\n{PERSON_TABLE}\n{cameras}'
+        f'name = "waiting"\ncalibration = {{ file = "calib.toml" }}\n{PERSON_TABLE}\n{tables}'
     )
 
 
