@@ -75,10 +75,10 @@ def _read_players(run: Path, stamp: Any) -> PlayersMotion:
     return read_players_run(run)
 
 
-def name_of_file(run: Path, name: str, within: str = "") -> str:
-    """Return the name of a file `within` a run's folder; one that is older was made of the run before, and says so."""
-    written_s = max(((run / table).stat().st_mtime for table in (MOTION, JOINTS) if (run / table).is_file()), default=0)
-    return f"{name} (of the run before)" if (run / within / name).stat().st_mtime < written_s else name
+def note_if_older(run: Path, path: Path) -> str:
+    """Say of a file that is older than the run in whose folder it lies that it was made of the run before."""
+    made_ns, *written_ns = (file_stamp(each)[1] for each in (path, run / MOTION, run / JOINTS))
+    return " (of the run before)" if 0 < made_ns < max(written_ns) else ""
 
 
 def count_frames(trial: Trial, n_images: int) -> int:
@@ -88,7 +88,7 @@ def count_frames(trial: Trial, n_images: int) -> int:
 
 def last_frame(trial: Trial, n_images: int) -> int:
     """Return the last of them; the start where there is none."""
-    return max([trial.start.frame, *_frames_of(trial, n_images)[-1:]])
+    return (_frames_of(trial, n_images) or [trial.start.frame])[-1]
 
 
 def _frames_of(trial: Trial, n_images: int) -> range:

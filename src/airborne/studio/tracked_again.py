@@ -58,8 +58,7 @@ def describe_tracked_again(before: RunBefore, run: Path, trial: Trial) -> str:
     """
     record, rows, step = read_record(run / RUN_RECORD), run_rows(run), trial.track.every
     is_new = ~np.isin(rows.index, before.index)
-    for first, last in stretches_between(before.record, record):
-        is_new |= (first < rows.index) & (rows.index < last)
+    is_new |= _lies_in(rows.index, stretches_between(before.record, record))
     if not is_new.any():
         return f"no frame was tracked again: the corrections touch none of {name_frames(rows.index, step)}"
     old, new = before.record.get("keys", {}), record["keys"]
@@ -85,11 +84,17 @@ def describe_pending(trial: Trial, run: Path) -> str:
         what.append(f"{mask['camera']} {verb} {name_stretch(mask['first'], mask['last'])}")
     if not what:
         return ""
-    touched = np.zeros(len(index), bool)
-    for first, last in pending.stretches:
-        touched |= (first < index) & (index < last)
-    frames = name_frames(index[touched], trial.track.every) if touched.any() else "no frame of this run"
+    touched = index[_lies_in(index, pending.stretches)]
+    frames = name_frames(touched, trial.track.every) if len(touched) else "no frame of this run"
     return f"Not tracked yet: {'; '.join(what)}. Tracking again goes over {frames}."
+
+
+def _lies_in(index: NDArray[np.int64], stretches: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """Say which frames (n,) lie between the ends, both outside, of any stretch."""
+    found = np.zeros(len(index), bool)
+    for first, last in stretches:
+        found |= (first < index) & (index < last)
+    return found
 
 
 def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[str]:

@@ -67,7 +67,9 @@ class Correction:
 
     def drop(self, frame: int) -> None:
         """Take a frame's key out of the trial."""
-        self._edit(frame, lambda text: without_key(text, frame), f"correction of frame {frame} dropped", "")
+        with show_errors():  # also where the method reads none, or the start is another by now
+            self.session.edit_trial(lambda text: without_key(text, frame), f"correction of frame {frame} dropped")
+            self._note_key(f"correction of frame {frame} dropped")
 
     def build_watch(self) -> None:
         """Lay out the button that tracks again, and what there is to say: where the pictures do not shrink for it."""
@@ -77,12 +79,11 @@ class Correction:
             self.watch.buttons = [self.again]
         self.pending = ui.label().classes("small warn")
         self.pending.bind_visibility_from(self.pending, "text")
+        self.hint = ui.label().classes("small")
         self._show_pending()
         if self.pending.text:
             self._tracked = None
         self.again.set_visibility(self._tracked is None)
-        self.hint = ui.label().classes("small")
-        self._show_hint()
 
     def _show_hint(self) -> None:
         """Say how to correct until something is corrected: beside the scene there is little room."""
@@ -94,6 +95,7 @@ class Correction:
         is_whole = not project.mistake and not self.watch.is_running
         with show_errors():
             self.pending.set_text(describe_pending(project.trial(), self.folder) if is_whole else "")
+        self._show_hint()
 
     def _how_far(self) -> str:
         """Say how many frames the run has while it is tracked again."""
@@ -212,13 +214,16 @@ class Correction:
             if trial.track.method not in KEY_METHODS:
                 raise TrialError(f"method '{trial.track.method}' reads no corrections; use {', '.join(KEY_METHODS)}")
             self.session.edit_trial(change, what)
-            self._note_change(what + sd)
+            self._note_key(what + sd)
+
+    def _note_key(self, what: str) -> None:
+        self.masks.list.refresh()
+        self._note_change(what)
 
     def _note_change(self, what: str) -> None:
         """Say what was written, and offer to track again."""
         self._seen = self._held()
         self.watch.says.set_text(what)
-        self.masks.list.refresh()
         self._show_pending()
         self.again.set_visibility(True)
         self._show(self.frame)

@@ -13,7 +13,7 @@ from airborne.run.film import check_order
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
 from airborne.studio.pages.layout import show_errors
-from airborne.studio.runs import name_of_file
+from airborne.studio.runs import note_if_older
 from airborne.studio.session import Session
 
 
@@ -74,4 +74,4 @@ class Making:
                 address = f"/file/{quote(self._folder.name)}/{path.parent.name}/{quote(path.name)}"
                 link = ui.element("a").props(f'href="{address}" target="_blank" rel="noopener"').classes("plain")
                 with link:
-                    ui.label(name_of_file(self._folder, path.name, path.parent.name))
+                    ui.label(path.name + note_if_older(self._folder, path))

@@ -20,8 +20,6 @@ from airborne.studio.view import CameraViews, Item
 
 _VEIL = "#16191dcc"  # over a picture that is left out
 _KEYS = {"camera", "first", "last"}
-
-
 _MOST_IN_ROW = 2  # at 1280 px; below a second row, the pictures would be small
 
 
@@ -94,13 +92,12 @@ class MaskPanel:
 
     def _warn_blind(self, camera: str, first: int, last: int) -> str:
         """Say in which of these frames no camera is left once this one is left out; nothing where one is."""
-        masks = [(mask["camera"], range(mask["first"], mask["last"] + 1)) for _, mask in self.masks]
-        others = [name for name in self.shown.names if name != camera]
-        is_out = [
-            all(any(frame in out for name, out in masks if name == other) for other in others)
-            for frame in range(first, last + 1)
-        ]
-        blind = first + np.flatnonzero(is_out)
+        frames, masks = np.arange(first, last + 1), [mask for _, mask in self.masks]
+        is_blind = np.ones(len(frames), bool)
+        for name in self.shown.names:
+            outs = [(mask["first"] <= frames) & (frames <= mask["last"]) for mask in masks if mask["camera"] == name]
+            is_blind &= name == camera or np.any([np.zeros_like(is_blind), *outs], axis=0)
+        blind = frames[is_blind]
         return f"; no camera is left in {name_frames(blind)}" if len(blind) else ""
 
     def remove(self, number: int, camera: str) -> None:

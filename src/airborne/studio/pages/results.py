@@ -15,7 +15,7 @@ from airborne.run.folder import list_tables
 from airborne.studio.pages.layout import in_thread, name_outer_links, page_frame
 from airborne.studio.pages.make_files import Making
 from airborne.studio.project import list_outer_runs, list_runs
-from airborne.studio.runs import name_of_file
+from airborne.studio.runs import note_if_older
 from airborne.studio.session import Session
 
 _HELP = "The report is one file, to send or to print. The tables open in any spreadsheet."
@@ -73,7 +73,7 @@ def _run_card(session: Session, folder: Path, found: _Found) -> None:
     ui.label("Tables").classes("soft")
     with ui.element("div").classes("row-line"):
         for name in found.tables:
-            _link(folder, name, name_of_file(folder, name))
+            _link(folder, name, name + note_if_older(folder, folder / name))
     Making(session, folder)
 
 

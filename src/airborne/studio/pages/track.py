@@ -117,8 +117,8 @@ class _Panel:
     def _is_running(self) -> bool:
         return self._command is not None and self._command.is_running
 
-    def _count(self) -> tuple[int, int | None]:
-        """Return how many frames the run holds so far, and which is the newest."""
+    def _read_run(self) -> tuple[int, int | None, bool]:
+        """Return how many frames the run holds so far, which is the newest, and whether it is finished."""
         run, command = find_run(self.session.folder, self._name), self._command
         if run is None or (
             command is not None
@@ -126,8 +126,14 @@ class _Panel:
             and "--overwrite" in command.words
             and not command.has_written(run / MOTION)
         ):
-            return 0, None  # what is there is the run before
-        return count_rows(run)
+            return 0, None, False  # what is there is the run before
+        return *count_rows(run), (run / SUMMARY).is_file()
+
+    def _watch_run(self) -> tuple[int, int | None, bool]:
+        """Read the run; a terminal, or another studio, may have begun one."""
+        if not self._is_running:
+            self.session.watch_tracking()
+        return self._read_run()
 
     def start(self, *options: str) -> None:
         """Start `airborne track`."""
@@ -136,14 +142,14 @@ class _Panel:
         with show_errors():
             self.session.project().trial()
             words = ["track", self.session.path.name, "-o", self.folder.name, *options]
-            self.n_before = self._count()[0] if "--resume" in options else 0
+            self.n_before = self._read_run()[0] if "--resume" in options else 0
             self.session.commands["track"] = Command(words, self.session.folder)
             self.n_done = -1
             self._show_buttons()
 
     async def ask(self) -> None:
         """Track again once it is clear what becomes of the run that is there."""
-        old, n_done = self._name, (await in_thread(self._count, says=""))[0]
+        old, n_done = self._name, (await in_thread(self._read_run, says=""))[0]
         new = next_run_name(self.session.folder, old)
         with ui.dialog().props('aria-label="track again"') as dialog, ui.card():
             held = f"{old} holds a run of {count(n_done, 'frame')}." if n_done else f"{old} holds a run."
@@ -175,10 +181,7 @@ class _Panel:
 
     async def look(self) -> None:
         """Show how far the run is, and its newest frame unless the user looks at another."""
-        n_done, newest = await in_thread(self._count, says="")
-        if not self._is_running:  # a terminal, or another studio, may have begun one
-            with show_errors():
-                self.session.watch_tracking()
+        n_done, newest, is_finished = await in_thread(self._watch_run, says="")
         command = self._command
         if self._is_running != self._was_running:  # another window has started it, or it has ended
             self._show_buttons()
@@ -187,8 +190,6 @@ class _Panel:
         elif command is not None and command is not self.ended:
             self.ended = command
             self._say_end(command)
-        run = find_run(self.session.folder, self._name)
-        is_finished = run is not None and (run / SUMMARY).is_file()
         if (n_done, is_finished) != (self.n_done, self.is_finished):
             is_first, self.n_done, self.is_finished = self.n_done <= 0, n_done, is_finished
             self.view.run_method("refresh")
