@@ -122,11 +122,20 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back_of_the_run_that_is_chosen(f
         page.get_by_text("left out of frame 11; no camera is left in frame 11; players are tracked again").wait_for()
         choose_run(page, "person")
         page.get_by_text("reading the run").first.wait_for()
-        page.locator("h1").click()  # out of the list
         page.keyboard.press("r")  # before that run is there
         wait_for_run(page, "person")
         wait_for_frame(page, LOST)
         page.keyboard.press("Home")  # the pictures were not clicked
+        wait_for_frame(page, 0)
+        page.locator("h1").click()
+        page.get_by_label("run", exact=True).focus()  # as a list does of itself, late after a choice
+        page.keyboard.press("End")
+        wait_for_frame(page, N - 1)
+        page.keyboard.press("Tab")
+        page.get_by_label("run", exact=True).focus()  # who comes by keys is in the list
+        page.keyboard.press("Home")
+        assert page.evaluate("document.querySelector('canvas.view').view.wanted") == N - 1
+        page.get_by_role("button", name="next lost").press("Home")
         wait_for_frame(page, 0)
         page.get_by_role("button", name="next lost").press("ArrowRight")
         wait_for_frame(page, 1)

@@ -38,7 +38,7 @@ _PREVIEWERS = ThreadPoolExecutor(2, thread_name_prefix="previews")  # beside all
 _THUMBNAIL_PX = 240  # wide
 _SCRIPTS = (  # that components import
     Path(export.__file__).parent / "templates" / "curves.js",  # drawn alike in the report
-    *(Path(__file__).with_name(name) for name in ("view_drawing.js", "view_frames.js")),
+    *(Path(__file__).with_name(name) for name in ("view_drawing.js", "view_frames.js", "page_keys.js")),
 )
 _EXAMPLES = Path(__file__).with_name("examples")  # pictures of each step, which a test draws
 _KEEP = {"cache-control": "private, max-age=3600"}

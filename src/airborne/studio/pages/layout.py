@@ -44,19 +44,7 @@ _KEYS = {
     "?": "this sheet",
 }
 
-_PRESS_BLUE = """(() => { // the last that is there, as Use comes after Find; a button in focus hears Enter itself
-    const here = document.activeElement, card = here.closest(".card");
-    const blue = [...document.querySelectorAll(".main .q-btn--unelevated.bg-primary:not(.disabled)")];
-    const seen = blue.filter((each) => each.checkVisibility()), near = seen.filter((each) => card?.contains(each));
-    const cards = new Set(seen.map((each) => each.closest(".card")));
-    const button = near.at(-1) || (cards.size === 1 && seen.at(-1));
-    if (button && here.tagName !== "BUTTON") button.click();
-})()"""
-
-
-_KEEP_FIELDS = """document.addEventListener("keydown", (event) => { // or the browser undoes what was typed last, too
-    if (event.ctrlKey && /[zy]/.test(event.key) && !event.target.matches("input, textarea")) event.preventDefault();
-})"""
+_PAGE_KEYS = 'import("/parts/page_keys.js")'
 
 
 @asynccontextmanager
@@ -124,7 +112,7 @@ async def page_frame(
             guide()
             await look()
             await ui.context.client.connected()
-            ui.run_javascript(_KEEP_FIELDS)
+            ui.run_javascript(_PAGE_KEYS)
             yield changed
 
 
@@ -139,7 +127,7 @@ async def _key(event, sheet: ui.dialog, move: Callable[[str], Awaitable[None]]) 
 
 def _enter(event: KeyEventArguments) -> None:
     if event.action.keydown and not event.action.repeat and event.modifiers.ctrl and event.key == "Enter":
-        ui.run_javascript(_PRESS_BLUE)
+        ui.run_javascript(f"{_PAGE_KEYS}.then((keys) => keys.pressBlue())")
 
 
 def _rail(session: Session, here: str) -> None:
