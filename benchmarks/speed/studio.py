@@ -86,31 +86,24 @@ def repeat_clip(second: Path, path: Path, seconds: int) -> None:
                     target.mux(packet)
 
 
-def write_trial(folder: Path, second: Path, names: list[str], seconds: int) -> None:
+def rig_around(places: dict[str, list[float]], size: tuple[int, int]) -> Rig:
+    """Return cameras at places that look at a person who stands in the midst."""
+    cameras = [camera_looking_at(name, at, [0, 0, 1.1], focal_px=1500, size=size) for name, at in places.items()]
+    return Rig(tuple(cameras))
+
+
+def write_trial(folder: Path, second: Path, rig: Rig, seconds: int) -> None:
     """Write a trial whose cameras show the same clip."""
     folder.mkdir()
+    names = rig.names
     repeat_clip(second, folder / f"{names[0]}.mp4", seconds)
     for name in names[1:]:
         os.link(folder / f"{names[0]}.mp4", folder / f"{name}.mp4")
-    around = [[4 * np.cos(k), 4 * np.sin(k), 1.5] for k in range(len(names))]
-    cameras = [
-        camera_looking_at(*each, [0, 0, 1.1], focal_px=1500, size=SIZE) for each in zip(names, around, strict=True)
-    ]
-    write_pose2sim(folder / "calib.toml", Rig(tuple(cameras)))
+    write_pose2sim(folder / "calib.toml", rig)
     tables = "".join(f'[[camera]]\nname = "{name}"\nvideo = "{name}.mp4"\n' for name in names)
     (folder / "trial.toml").write_text(
         f'name = "waiting"\ncalibration = {{ file = "calib.toml" }}\n{PERSON_TABLE}\n{tables}'
     )
-
-
-def write_run(folder: Path, n: int) -> Rig:
-    """Write a run of a person who moves, and the trial's calibration."""
-    with av.open(str(folder / "left.mp4")) as file:
-        size = (file.streams.video[0].width, file.streams.video[0].height)
-    rig = Rig(tuple(camera_looking_at(name, at, [0, 0, 1.1], focal_px=1500, size=size) for name, at in PLACES.items()))
-    write_pose2sim(folder / "calib.toml", rig)
-    write_person_run(folder / "results", rig, n, Fraction(RATE))
-    return rig
 
 
 def step_ms(page, n: int) -> list[float]:
@@ -205,8 +198,9 @@ def server() -> tuple[float, float]:
 
 def measure_short(folder: Path, second: Path, steps: int) -> dict[str, list[float]]:
     """Measure steps, jumps and drags on a clip of 20 seconds."""
-    write_trial(folder, second, list(PLACES), 20)
-    rig = write_run(folder, 20 * RATE)
+    rig = rig_around(PLACES, SIZE)
+    write_trial(folder, second, rig, 20)
+    write_person_run(folder / "results", rig, 20 * RATE, Fraction(RATE))
     with open_studio(folder) as address, open_page(address.replace("/?", "/track?")) as page:
         wait_for_frame(page, 0)
         page.wait_for_timeout(3000)  # what the kernels compile, once
@@ -233,7 +227,8 @@ def name_jumps(kind: str, measured: tuple[list[float], list[float], list[float]]
 
 def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[float]]:
     """Measure the first picture of four long videos, memory after jumps through them, and jumps through three."""
-    write_trial(folder, second, ["a", "b", "c", "d"], round(60 * minutes))
+    places = {name: [4 * np.cos(k), 4 * np.sin(k), 1.5] for k, name in enumerate("abcd")}
+    write_trial(folder, second, rig_around(places, SIZE), round(60 * minutes))
     text, n_frames = (folder / "trial.toml").read_text(), round(60 * minutes) * RATE
     (folder / "three.toml").write_text(text.rpartition("[[camera]]")[0])
     with open_studio(folder / "three.toml") as address, open_page(address) as page:
@@ -254,10 +249,11 @@ def measure_long(folder: Path, second: Path, minutes: float) -> dict[str, list[f
 
 def measure_many(folder: Path, second: Path) -> dict[str, list[float]]:
     """Measure Review and Results of a folder with 50 runs, one of them of 200,000 frames, one of 20 players."""
-    write_trial(folder, second, list(PLACES), N_MANY // RATE)
+    rig = rig_around(PLACES, SMALL)
+    write_trial(folder, second, rig, N_MANY // RATE)
     with (folder / "trial.toml").open("a") as file:
         file.write(START)
-    write_run(folder, RATE)
+    write_person_run(folder / "results", rig, RATE, Fraction(RATE))
     runs = folder / "results"
     for k in range(N_RUNS - 2):
         shutil.copytree(runs, folder / f"short{k}")

@@ -46,7 +46,7 @@ _NOTHING = (
 async def cameras_page(session: Session) -> None:
     """Let the user choose a calibration file, or a survey and click its points."""
     async with page_frame(session, "Cameras", "Where are the cameras?", _HELP) as changed:
-        if name_missing_steps(session, "Videos"):
+        if name_missing_steps(session, changed, "Videos"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:

@@ -47,7 +47,7 @@ _AFTER = {"point": "next point", "frame": "next frame", "stay": "nothing"}
 async def digitise_page(session: Session) -> None:
     """Let one person digitise points, and compare."""
     async with page_frame(session, "Digitise", "Where do you see it?", _HELP) as changed:
-        if name_missing_steps(session, "Videos"):
+        if name_missing_steps(session, changed, "Videos"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:

@@ -27,7 +27,7 @@ async def first_pose_page(session: Session) -> None:
     """Let the user find or click the pose at one frame, and write it into the trial."""
     project = session.project()
     async with page_frame(session, "First pose", "Where is the body at the start?", _HELP) as changed:
-        if name_missing_steps(session, "Videos", "Cameras", "Body"):
+        if name_missing_steps(session, changed, "Videos", "Cameras", "Body"):
             return
         shown = await work("indexing the videos", session.shown)
         rig = await work("calibrating the cameras", session.rig)

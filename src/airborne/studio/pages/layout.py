@@ -179,18 +179,24 @@ def _example(here: str) -> ui.dialog:
     return dialog
 
 
-def name_missing_steps(session: Session, *needed: str) -> bool:
-    """Tell which of the steps that this one needs come first, as they are not ready; return whether any is."""
-    missing = _missing_steps(session, needed)
-    if missing:
-        verb = "comes" if len(missing) == 1 else "come"
-        ui.label(f"First {verb} {', '.join(missing)}: see the steps at the left.").classes("warn")
-        ui.timer(_LOOK_EVERY_S, lambda: _missing_steps(session, needed) or ui.navigate.reload())
-    return bool(missing)
+def name_missing_steps(session: Session, changed: list[Callable[[], Awaitable[None]]], *needed: str) -> bool:
+    """Tell which of the steps that this one needs come first, as they are not ready; return whether any is.
 
+    Once they are, and `changed` is called, the page is loaded anew.
+    """
 
-def _missing_steps(session: Session, needed: Sequence[str]) -> list[str]:
-    return [step.name for step in steps(session.project()) if step.name in needed and step.state != "ready"]
+    def missing() -> list[str]:
+        return [step.name for step in steps(session.project()) if step.name in needed and step.state != "ready"]
+
+    async def look() -> None:
+        if not missing():
+            ui.navigate.reload()
+
+    if names := missing():
+        verb = "comes" if len(names) == 1 else "come"
+        ui.label(f"First {verb} {', '.join(names)}: see the steps at the left.").classes("warn")
+        changed.append(look)
+    return bool(names)
 
 
 def name_outer_links(links: Sequence[str]) -> None:

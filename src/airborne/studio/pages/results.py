@@ -12,6 +12,7 @@ from airborne.errors import ResultError, count
 from airborne.export.methods_text import describe_corrections, describe_methods
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
+from airborne.run.self_check import alarms
 from airborne.studio.pages.layout import in_thread, name_outer_links, page_frame
 from airborne.studio.pages.make_files import Making
 from airborne.studio.project import list_outer_runs, list_runs
@@ -89,14 +90,15 @@ def _numbers(summary: dict[str, Any]) -> None:
                         with ui.element(tag):
                             ui.label(text)
     findings = summary.get("self_check") or []
-    alarms = [finding for finding in findings if finding["is_alarm"]]
+    n_alarms = len(alarms(findings))
     for text in summary.get("warnings") or []:
-        ui.label(text).classes("warn small")
+        if text not in alarms(findings):  # which stand below
+            ui.label(text).classes("warn small")
     for text in describe_corrections(summary):
         ui.label(text).classes("small")
     if findings:
         with ui.expansion(
-            f"{_CHECKED}: {count(len(alarms), 'alarm') if alarms else 'no alarm'}", value=bool(alarms)
+            f"{_CHECKED}: {count(n_alarms, 'alarm') if n_alarms else 'no alarm'}", value=n_alarms > 0
         ).props("dense"):
             for finding in findings:
                 ui.label(finding["sentence"]).classes("bad small" if finding["is_alarm"] else "soft small")

@@ -29,7 +29,7 @@ _HELP = (
 async def ruler_page(session: Session) -> None:
     """Let the user measure a distance in the pictures."""
     async with page_frame(session, "Body", "How long is it?", _HELP, task="ruler") as changed:
-        if name_missing_steps(session, "Videos", "Cameras"):
+        if name_missing_steps(session, changed, "Videos", "Cameras"):
             return
         shown = await work("indexing the videos", session.shown)
         rig = await work("calibrating the cameras", session.rig)

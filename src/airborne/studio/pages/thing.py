@@ -31,7 +31,7 @@ _FIELDS = ("size_mm", "centre_mm", "turn_deg")
 async def thing_page(session: Session) -> None:
     """Let the user describe a thing."""
     async with page_frame(session, "Body", "What is it made of?", _HELP, task="thing") as changed:
-        if name_missing_steps(session, "Videos"):
+        if name_missing_steps(session, changed, "Videos"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is not None:

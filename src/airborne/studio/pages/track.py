@@ -30,7 +30,7 @@ _HELP = (
 async def track_page(session: Session) -> None:
     """Start, watch, stop and resume a run."""
     async with page_frame(session, "Track", "Follow the body", _HELP) as changed:
-        if name_missing_steps(session, "Videos", "Cameras", "Body"):
+        if name_missing_steps(session, changed, "Videos", "Cameras", "Body"):
             return
         shown = await work("indexing the videos", session.shown)
         if shown is None:
