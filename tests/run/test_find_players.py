@@ -18,7 +18,7 @@ from tests.support.clips import write_clip
 from tests.support.jumping_scenes import CAMERAS, FPS, Hall, hop
 
 HALL = Hall({"left": hop((-0.1, -0.7), heading=np.pi, late_s=9), "right": hop((0.9, -0.6), heading=np.pi, late_s=9)})
-N_FRAMES = 6
+N_FRAMES = 3
 TRIAL = """name = "block"
 camera = [{ name = "cam0", video = "0.mkv" }, { name = "cam1", video = "1.mkv" }, { name = "cam2", video = "2.mkv" }]
 calibration = { file = "calib.toml" }
