@@ -11,6 +11,7 @@ from airborne.errors import ResultError
 from airborne.run.film import write_film
 from airborne.video import VideoSource, VideoWriter, inspect
 from airborne.video.seeking import ImageReader, index_images
+from tests.run.test_find import cli
 from tests.support.person_run import write_person_run
 
 SIZE, N, RATE = (320, 240), 12, Fraction(50)
@@ -32,7 +33,7 @@ def run(tmp_path_factory):
 
 
 def test_a_stretch_shows_its_frames_and_a_cursor_over_the_curves(run, tmp_path):
-    assert write_film(run, tmp_path / "film.mp4", first=3, last=8) == 6
+    assert write_film(run, tmp_path / "film.mp4", first=3, last=8) == (3, 8)
     source = VideoSource("film", tmp_path / "film.mp4")
     assert inspect(source).frame_rate == RATE
     with ImageReader(source, index_images(source)) as reader:
@@ -44,6 +45,11 @@ def test_a_stretch_shows_its_frames_and_a_cursor_over_the_curves(run, tmp_path):
         np.testing.assert_allclose(middles, [20 + 5 * (3 + k), 20 + 15 * (3 + k)], atol=4)
         below = image[SIZE[1] + 4 :].sum(axis=2).mean(axis=0)
         assert abs(int(np.argmin(below)) - k / 5 * (image.shape[1] - 1)) <= 3
+
+
+def test_a_stretch_that_goes_beyond_the_run_ends_with_it(run, tmp_path, monkeypatch, capsys):
+    assert cli(monkeypatch, "film", run, "--first", 9, "--last", 99, "-o", tmp_path / "end.mp4") == 0
+    assert capsys.readouterr().out.strip() == f"{tmp_path / 'end.mp4'}: frames 9 to {N - 1}"
 
 
 def test_a_gif_leaves_pictures_out_that_browsers_would_slow_down(run, tmp_path):

@@ -28,5 +28,5 @@ def film_command(
 
     path = results / VIDEOS / "film.mp4" if output is None else output
     with progress("drawing") as report:
-        n = write_film(results, path, first=first, last=last, progress=report)
-    print(f"{path}: {n} frames")
+        begin, end = write_film(results, path, first=first, last=last, progress=report)
+    print(f"{path}: frames {begin} to {end}")

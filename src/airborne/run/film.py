@@ -35,8 +35,8 @@ def write_film(
     first: int | None = None,
     last: int | None = None,
     progress: Progress | None = None,
-) -> int:
-    """Write frames `first` to `last` of a run, by default all, as .mp4 or .gif; return how many they are.
+) -> tuple[int, int]:
+    """Write frames `first` to `last` of a run, by default all, as .mp4 or .gif; return its first and last there.
 
     Raises ResultError where the run has no videos of its overlays, or no such frames.
     """
@@ -57,7 +57,7 @@ def write_film(
         pictures = _draw(readers, rows, time_s=time_s, series=series, width=_WIDEST_PX[path.suffix.lower()])
         rate = readers[0].index.facts.frame_rate
         _write(path, _report(pictures, len(rows), progress), rate)
-    return len(rows)
+    return int(index[rows[0]]), int(index[rows[-1]])
 
 
 def check_order(first: float | None, last: float | None) -> None:

@@ -46,11 +46,11 @@ class Making:
 
     def film(self) -> None:
         """Start `airborne film`."""
-        path = f"{self._folder.name}/{FOLDERS[2]}/film.{self._kind.value}"
         first, last = self._first.value, self._last.value
-        words = [
-            word for name, n in (("--first", first), ("--last", last)) if n is not None for word in (name, f"{n:.0f}")
-        ]
+        ends = [(name, f"{n:.0f}") for name, n in (("first", first), ("last", last)) if n is not None]
+        stem = "_".join(["film", *(name + n for name, n in ends)])  # each stretch is kept
+        path = f"{self._folder.name}/{FOLDERS[2]}/{stem}.{self._kind.value}"
+        words = [word for name, n in ends for word in (f"--{name}", n)]
         self._watch.words = "drawing the film"
         with show_errors():
             check_order(first, last)
@@ -68,7 +68,7 @@ class Making:
         return ui.button("Make a film", on_click=self.film).props("outline")
 
     def _list_files(self) -> None:
-        made = sorted([*(self._folder / "export").glob("*"), *(self._folder / FOLDERS[2]).glob("film.*")])
+        made = sorted([*(self._folder / "export").glob("*"), *(self._folder / FOLDERS[2]).glob("film*")])
         with ui.element("div").classes("row-line"):
             for path in made:
                 address = f"/file/{quote(self._folder.name)}/{path.parent.name}/{quote(path.name)}"
