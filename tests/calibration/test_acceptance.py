@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import airborne
 from airborne import cli
 from airborne.calibration.acceptance import write_accepted
 from airborne.cameras import Rig, read_rig
+from airborne.errors import AirborneError, CalibrationError
 from tests.support.cameras import three_cameras
 
 RIG = three_cameras()
@@ -36,6 +38,49 @@ def test_a_few_wrong_clicks_and_errors_that_are_unknown_are_no_reason(tmp_path):
     unknown = np.full(20, np.nan)
     held_out_px = dict(zip(RIG.names, (some, unknown, some), strict=True))
     assert write_accepted(tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=held_out_px)[1] == ()
+
+
+def test_one_point_that_spoils_a_fit_of_least_squares_is_a_reason(tmp_path):
+    residual_px = {name: np.full((20, 2), 0.5) for name in RIG.names}
+    residual_px[RIG.names[0]][3] = (90.0, 0.0)
+    residual_px[RIG.names[1]][4] = np.nan
+    written, reasons = write_accepted(
+        tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=GOOD, residual_px=residual_px
+    )
+    assert written.name == "calib.rejected.toml"
+    assert len(reasons) == 1 and reasons[0].startswith(f"{RIG.names[0]}: a control point lies 90 px from where")
+
+
+@pytest.mark.parametrize(
+    ("output", "said"),
+    [
+        ("points.csv", "is what the cameras are calibrated from"),
+        ("notes.txt", "exists and is no calibration"),
+        ("none/calib.toml", "there is no folder"),
+    ],
+)
+def test_no_other_file_is_written_over(tmp_path, monkeypatch, capsys, output, said):
+    for name in ("points.csv", "notes.txt"):
+        (tmp_path / name).write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["airborne", "calibrate", "points.csv", "--size", "640x480", "-o", output])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert [(tmp_path / name).read_text() for name in ("points.csv", "notes.txt")] == ["mine"] * 2
+
+
+def test_two_points_mixed_up_stop_tracking_and_the_python_interface(thrown_cross, tmp_path):
+    rows = [line.split(",") for line in (thrown_cross / "control_points.csv").read_text().splitlines()]
+    u = rows[0].index("cam2_u")
+    one, other = (next(row for row in rows if row[0] == name) for name in ("P13", "P14"))
+    one[u : u + 2], other[u : u + 2] = other[u : u + 2], one[u : u + 2]
+    (tmp_path / "mixed.csv").write_text("\n".join(map(",".join, rows)) + "\n")
+    with pytest.raises(CalibrationError, match=r"'P1[34]' misses by .*'P1[34]' misses by"):
+        airborne.calibrate(tmp_path / "mixed.csv", sizes=(768, 576))
+    with pytest.raises(AirborneError, match=r"expected .width, height. in pixels"):
+        airborne.calibrate(tmp_path / "mixed.csv", sizes=768)
 
 
 def test_what_our_reader_refuses_is_rejected(tmp_path):

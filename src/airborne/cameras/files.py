@@ -140,6 +140,8 @@ def write_rig(
     texts, notes = _texts(kind, rig, file_unit, pixels=pixels or PixelConvention(), errors_px=errors_px)
     if kind == "easymocap":
         path.mkdir(parents=True, exist_ok=True)
+    if not path.parent.is_dir():
+        raise CalibrationError(f"{path}: there is no folder {path.parent}; make it, or give another path")
     for name, text in texts.items():
         write_text(path / name, text)  # path / "" is path itself
     return notes

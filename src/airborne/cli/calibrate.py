@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from airborne.cli.console import Json, errors, sizes_px
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, count
 from airborne.io.terminal import Stages
 from airborne.io.writing import write_text
 
@@ -59,6 +59,12 @@ def calibrate_command(
     for path in (*files, board, timestamps):
         if path is not None and not path.exists():
             raise AirborneError(f"{path} does not exist; check the path")
+        if path is not None and output.exists() and output.samefile(path):
+            raise AirborneError(f"-o {output} is what the cameras are calibrated from; give the result another name")
+    if output.exists() and output.suffix.lower() != ".toml":
+        raise AirborneError(f"-o {output} exists and is no calibration (.toml); give the result another name")
+    if not output.parent.is_dir():
+        raise AirborneError(f"-o {output}: there is no folder {output.parent}; make it, or give another path")
     if board is None and files[0].is_dir():
         raise AirborneError(f"{files[0]} is a folder; give a table or a file of sources, or --board for its images")
     if court is not None or wand is not None:
@@ -66,6 +72,8 @@ def calibrate_command(
         sources = _wand_sources(files, wand, size) if is_filmed else _table_sources(files, court, wand, size)
         _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
         return
+    if board is None and files[0].suffix.lower() not in (*_TABLES, ".toml"):
+        raise AirborneError(f"{files[0]} is no table and no file of sources; videos and images need --board or --wand")
     if board is None and len(files) == 1 and files[0].suffix.lower() != ".toml":
         if report is not None:
             raise AirborneError("--report goes with sources; the result of a table of control points alone is printed")
@@ -101,6 +109,7 @@ def _from_control_points(
         calibration.rig,
         errors_px={fit.name: fit.rms_px for fit in calibration.fits},
         held_out_px={fit.name: np.linalg.norm(fit.held_out_px, axis=1) for fit in calibration.fits},
+        residual_px={fit.name: fit.residual_px for fit in calibration.fits},
     )
     print(json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration))
     if not as_json:
@@ -199,7 +208,7 @@ def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> No
     write_text(folder / "report.json", json.dumps(report, indent=1))
     print(json.dumps(report) if as_json else describe_calibration(calibration))
     if not as_json:
-        print(f"written: {written}\nreport: {folder / 'report.json'} and {len(pictures)} images beside it")
+        print(f"written: {written}\nreport: {folder / 'report.json'} and {count(len(pictures), 'image')} beside it")
     _reject(written, reasons)
 
 

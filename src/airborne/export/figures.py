@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from airborne.body import BodyModel
+from airborne.errors import ResultError
 from airborne.export import panels
 from airborne.io.figures import save_png
 from airborne.motion import Motion, has_inertias, joint_angles, measure_flight, root_angles
@@ -104,6 +105,8 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
     Raises ResultError where the motion is another body's.
     """
     table, joint_panels = joint_angles(motion, model), main_joints(motion.joints)
+    if not joint_panels:
+        raise ResultError("this body has no joints, so there are no angles of joints to draw")
     unobservable, singular = np.zeros((2, len(motion)), bool)
     figure, grid = panels.panel_figure(-(-len(joint_panels) // 2), 2, row_in=1.6)
     cells = [axes for row in grid for axes in row]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -20,6 +21,7 @@ from airborne.calibration import (
     read_sources,
 )
 from airborne.calibration import calibrate as calibrate_points
+from airborne.calibration.acceptance import require_plausible
 from airborne.errors import AirborneError, require_choice
 from airborne.io.terminal import Stages
 from airborne.io.terminal import progress as progress_bar
@@ -61,13 +63,15 @@ def track(
     folder: FilePath,
     *,
     resume: bool = False,
+    overwrite: bool = False,
     pictures: bool = True,
     progress: bool | Progress = False,
 ) -> Run:
     """Track a trial, a body or players, and write the results into a folder; as `airborne track` does.
 
-    `resume` continues a run that was stopped, to the same result. `pictures=False` leaves out videos, figures and
-    report. Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
+    `resume` continues a run that was stopped, to the same result; `overwrite` replaces one. `pictures=False` leaves
+    out videos, figures and report. Raises an AirborneError for input that cannot be used, and for a folder that holds
+    another run.
 
     >>> run = track("trial.toml", "again", pictures=False, progress=True)
     >>> run
@@ -75,7 +79,7 @@ def track(
     """
     trial = trial if isinstance(trial, Trial) else read_trial(trial)
     with _reporting(progress, f"tracking {trial.name}") as report:
-        track_trial(trial, Path(folder), resume=resume, pictures=pictures, progress=report)
+        track_trial(trial, Path(folder), resume=resume, overwrite=overwrite, pictures=pictures, progress=report)
     return read_run(folder)
 
 
@@ -85,7 +89,7 @@ def read_run(folder: FilePath) -> Run:
     >>> read_run("results").summary["n_frames"]
     5
     """
-    return Run(Path(folder))
+    return Run(Path(folder).absolute())
 
 
 def calibrate(
@@ -98,7 +102,7 @@ def calibrate(
     """Calibrate cameras from a file of sources (.toml), or from a table of control points (.csv); `.rig` has them.
 
     A table needs `sizes`, (width, height) [px] of all images, or by camera; `method` is for tables too. Raises an
-    AirborneError where cameras cannot be estimated.
+    AirborneError where cameras cannot be estimated, or come out too wrong to measure with.
 
     >>> rig = calibrate("control_points.csv", sizes=(768, 576)).rig
     >>> rig["cam1"].px_from_world([0.0, 0.0, 1.3]).shape
@@ -108,15 +112,22 @@ def calibrate(
         if sizes is not None:
             raise AirborneError("sizes go with a table of control points; a file of sources has size = [width, height]")
         with _reporting_stages(progress) as report:
-            return calibrate_from(read_sources(Path(sources)), report)
+            found = calibrate_from(read_sources(Path(sources)), report)
+        require_plausible(found)
+        return found
     if sizes is None:
         raise AirborneError("sizes is missing: give the image size in pixels, such as sizes=(768, 576)")
     table = read_control_points(Path(sources))
     by_camera = sizes if isinstance(sizes, Mapping) else dict.fromkeys(table.cameras, sizes)
+    for size in by_camera.values():
+        if not (isinstance(size, Sequence) and len(size) == 2 and all(isinstance(number, Integral) for number in size)):
+            raise AirborneError(f"sizes holds {size!r}; expected (width, height) in pixels, such as (768, 576)")
     missing = [name for name in table.cameras if name not in by_camera]
     if missing:
         raise AirborneError(f"sizes gives no size for {', '.join(missing)}; add (width, height) in pixels")
-    return calibrate_points(table, by_camera, method=method)
+    calibration = calibrate_points(table, by_camera, method=method)
+    require_plausible(calibration)
+    return calibration
 
 
 def fit_body(
@@ -164,7 +175,7 @@ def evaluate(
 
 def smooth(
     run: Run | FilePath,
-    method: Literal["butterworth", "spline", "kalman"] = "butterworth",
+    method: Literal["butterworth", "spline", "kalman"] | None = None,
     *,
     cutoff_hz: float | None = None,
     fill_s: float = 0.0,
@@ -176,7 +187,8 @@ def smooth(
 ) -> SmoothRun:
     """Smooth a run and compute velocities and accelerations: new tables beside the raw ones, and in `.tables`.
 
-    A Butterworth filter without a cut-off gets that of the residual analysis; gaps up to `fill_s` [s] are filled;
+    Without a method by the Kalman smoother, as `airborne smooth` does, or with a cut-off by a Butterworth filter. That
+    filter without a cut-off gets the one of the residual analysis; gaps up to `fill_s` [s] are filled;
     `events_s` are the times [s] that no filter crosses, None those that are found. With `images`, the run's trial, the
     whole run of a person is fitted at once to its videos before the Kalman smoother. Raises ResultError for what cannot
     be smoothed so.
@@ -184,6 +196,7 @@ def smooth(
     >>> smooth("results", cutoff_hz=10, events_s=[]).tables["joints"]["velocity"].attrs["units"]
     'm/s'
     """
+    method = method or ("kalman" if cutoff_hz is None else "butterworth")
     require_choice(method, _SMOOTHINGS, "method")
     settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
     out = None if output is None else Path(output)
@@ -204,7 +217,7 @@ def export_run(
     """
     unknown = [format for format in formats if format not in EXPORT_FORMATS]
     if unknown:
-        raise AirborneError(f"no format {', '.join(unknown)}; there are: {', '.join(EXPORT_FORMATS)}")
+        raise AirborneError(f"no format {', '.join(map(str, unknown))}; there are: {', '.join(EXPORT_FORMATS)}")
     with _reporting_stages(progress) as report:
         return write_export(_folder(run), None if output is None else Path(output), formats, report)
 

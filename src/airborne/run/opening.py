@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+from airborne.calibration.acceptance import require_plausible
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import Camera, Rig, read_rig
@@ -107,6 +108,7 @@ def read_or_calibrate(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[
                 f"it has: {', '.join(points.cameras)}"
             )
         calibration = calibrate(points.select(list(sizes)), sizes, method=trial.calibration.method)
+        require_plausible(calibration)
         return calibration.rig, calibration
     rig = read_rig(trial.path(trial.calibration.file or ""))
     return Rig(tuple(_camera_as_saved(rig, camera, sizes[camera.name]) for camera in trial.camera)), None

@@ -42,10 +42,12 @@ class Run:
             raise ResultError(f"{self.folder} holds no run; expected the output folder of a run")
 
     def __repr__(self) -> str:
+        here = Path.cwd()
+        folder = str(self.folder.relative_to(here) if self.folder.is_relative_to(here) else self.folder)
         try:
-            return f"Run({str(self.folder)!r}): {self._state()}"
+            return f"Run({folder!r}): {self._state()}"
         except AirborneError as error:
-            return f"Run({str(self.folder)!r}): {error}"
+            return f"Run({folder!r}): {error}"
 
     def _state(self) -> str:
         if not (self.folder / "summary.json").is_file():

@@ -283,6 +283,8 @@ def list_wrong_names(trial: Trial) -> list[str]:
 
 def _select_cameras(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
     by_name = {camera.name: camera for camera in trial.camera}
+    if isinstance(cameras, str) or not cameras:
+        raise TrialError(f"{path.name}: cameras = {cameras!r}; expected a list of names, of: {', '.join(by_name)}")
     unknown = [name for name in cameras if name not in by_name]
     if unknown:
         raise TrialError(f"{path.name}: no camera {', '.join(unknown)}; it has: {', '.join(by_name)}")

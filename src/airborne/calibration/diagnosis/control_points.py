@@ -93,7 +93,7 @@ def decompose_cameras(points: ControlPoints) -> dict[str, Decomposition]:
     if mirrored:
         raise CalibrationError(
             f"camera '{mirrored[0]}' comes out left-handed while others do not: its u and v are exchanged, "
-            "or one of them counts from the wrong side"
+            "one of them counts from the wrong side, or points are mixed up"
         )
     return decompositions
 
