@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from airborne.cli import main
-from airborne.errors import TrialError, UndecidedError
+from airborne.errors import ResultError, TrialError, UndecidedError
 from airborne.evaluation import read_truth
 from airborne.geometry.rotations import geodesic
 from airborne.run import find
@@ -94,6 +94,12 @@ def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp
         find.find_start(trial, out, take=3)
     run = track_trial(trial, out, take=1, first_frame=True, pictures=False)
     assert run.summary["n_tracked"] == 1
+    assert run.summary["events"][0].startswith("[start] is candidate 1, as --take says: the body stands out best")
+    assert "turned poses of this body look alike" in run.summary["events"][0]
+    again = track_trial(trial, out, resume=True, first_frame=True, pictures=False)  # the run knows what it took
+    assert again.summary["n_tracked"] == 1
+    with pytest.raises(ResultError, match="take 1, now 2"):
+        track_trial(trial, out, take=2, resume=True, first_frame=True, pictures=False)
 
 
 def test_what_cannot_be_found_is_said(path, tmp_path):
@@ -111,6 +117,13 @@ def test_check_says_that_the_body_will_be_looked_for(path):
     assert "start: not given; the body is looked for when the trial is tracked" in checks.well
 
 
+def test_check_reads_the_keys_of_a_trial_without_a_start_too(path):
+    keyed = path.parent / "keyed.toml"
+    keyed.write_text(f"{path.read_text()}\n[[key]]\nframe = 3\njoints_m = {{ nose = [0.0, 0.0, 1.0] }}\n")
+    (mistake,) = check_trial(keyed).mistakes
+    assert "nose" in mistake
+
+
 def test_frame_writes_the_pixels_to_click_in(path, tmp_path, monkeypatch):
     picture = tmp_path / "f.png"
     assert cli(monkeypatch, "frame", path, "--camera", "cam2", "--frame", 5, "-o", picture) == 0
@@ -119,7 +132,7 @@ def test_frame_writes_the_pixels_to_click_in(path, tmp_path, monkeypatch):
     trial = read_trial(path)
     with pytest.raises(TrialError, match="no camera 'cam9'; it has: cam1, cam2, cam3"):
         write_frame(trial, "cam9", 0, picture)
-    with pytest.raises(TrialError, match="cam1 has no image at frame 999"):
+    with pytest.raises(TrialError, match="cam1 has no image at frame 999; frames are 0 to"):
         write_frame(trial, "cam1", 999, picture)
     with pytest.raises(TrialError, match=r"cannot be written; give a file .* that ends in \.png"):
         write_frame(trial, "cam1", 0, tmp_path / "none" / "f.png")

@@ -138,6 +138,14 @@ def test_a_key_that_is_not_tracked_is_said_to_be_unused(cross, thrown_cross, tmp
     assert any("[[key]] of frame 5, 30 is not used" in event for event in events)
 
 
+def test_a_frame_that_is_lost_to_a_wrong_key_is_named(cross, thrown_cross, tmp_path):
+    trial = cross(KeyTable(frame=2, position_m=[0.0, 0.0, 2.4]))
+    short = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": 4})})
+    summary = track_trial(short, tmp_path / "run", pictures=False).summary
+    assert summary["n_lost"] == 1
+    assert any(text.startswith("frame 2 is lost although there is a [[key]] of it") for text in summary["warnings"])
+
+
 def test_keys_bring_no_harm(run, thrown_cross):
     with (thrown_cross / "truth.csv").open() as file:
         true = {int(row["field"]): [float(row[axis]) for axis in ("x_m", "y_m", "z_m")] for row in csv.DictReader(file)}

@@ -42,7 +42,7 @@ def smooth_command(
     """Smooth a run and compute velocities and accelerations: new tables beside the raw ones.
 
     Without --butterworth, --spline or --kalman the Kalman smoother, which uses the run's own covariances. With --images
-    it gets better poses, and of a preset a better body, from the videos.
+    it gets better poses from the videos.
 
     Example: airborne smooth results --images trial.toml
     """

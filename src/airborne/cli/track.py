@@ -152,7 +152,7 @@ def _describe_self_check(summary: dict) -> str | None:
     if findings is None or summary["n_frames"] == summary["n_lost"]:
         return None
     if not findings:
-        return "self-check: the scene is not seen without the body, so that nothing can be said of body and cameras"
+        return "self-check: the scene is never seen without the body, so nothing can be said; track more frames"
     if any(each["is_alarm"] for each in findings):
         return "self-check: something is wrong, see the notes"
     return "self-check: nothing seems wrong; " + "; ".join(each["sentence"] for each in findings[:2])

@@ -136,11 +136,11 @@ class BodyRun:
     def _fit_shape(self, first: Frames) -> BodyRun:
         """Return a preset fitted to the person in some of the first frames, those where it is tracked.
 
-        Its landmarks lie where the points of the start mark them. With keys, which are about its lengths, the body
-        stays as it is.
+        Its landmarks lie where the points of the start mark them. Keys change nothing of it, so that a run to which one
+        is added goes on with its body; they are read anew for its lengths.
         """
         body = self.trial.body
-        if body.preset is None or self.keys:
+        if body.preset is None:
             return self
         tracker = tracker_of(self.trial.settings, self.model, self.start)
         estimates = track_frames(tracker, islice(self.recording, N_FRAMES), lambda estimate: None)
@@ -158,7 +158,8 @@ class BodyRun:
             tracker = tracker_of(self.trial.settings, fitted, start)
             at_first = tracker.search(tracker.init(), first).pose
             fitted = fitted if at_first is None else place_landmarks(fitted, at_first, self.points)
-        return replace(self, model=fitted, start=start)
+        keys, _ = keys_of_frames(self.trial, fitted, self.recording)
+        return replace(self, model=fitted, start=start, keys=keys)
 
     def track(
         self,

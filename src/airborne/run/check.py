@@ -119,7 +119,13 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
     recording = opened.recording
     if recording.n_frames == 0:
         checks.mistakes.append(str(past_the_end_error(trial, recording)))
-    elif trial.start.find:
+        return
+    if trial.key and not trial.has_players:
+        checks.attempt(
+            lambda: keys_of_frames(trial, trial.model(), recording),
+            lambda keys: "; ".join([f"keys: {len(keys[0])} of {len(trial.key)} are used", *keys[1]]),
+        )
+    if trial.start.find:
         who = "players are" if trial.has_players else "body is"
         checks.add(f"start: not given; the {who} looked for when the trial is tracked")
     elif trial.has_players:
@@ -133,17 +139,12 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda: find_first_pose(trial, model, recording.rig, opened.detections),
             lambda first: "; ".join([f"start: frame {trial.start.frame}", *first.notes]),
         )
-        if trial.key:
-            checks.attempt(
-                lambda: keys_of_frames(trial, model, recording),
-                lambda keys: "; ".join([f"keys: {len(keys[0])} of {len(trial.key)} are used", *keys[1]]),
-            )
         if first is not None and not is_seen(model.with_pose(first.pose), recording.rig):
             checks.mistakes.append(f"{trial.name}: {OUT_OF_SIGHT}")
         elif first is not None:
             checks.attempt(
                 lambda: refuse_mix_ups(recording, model, first.pose),
-                lambda _: "videos: each fits its own camera best",
+                lambda _: "videos: nothing says that some are other cameras'",
             )
     for event in recording.events:
         checks.add(f"note: {event}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from airborne.motion import Motion, PlayersMotion
+from airborne.tracking import Status
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 
@@ -32,6 +34,19 @@ def corrections_of(trial: Trial, frames: Sequence[int]) -> dict[str, Any]:
         if mask.first <= last and mask.last >= first
     ]
     return {name: found for name, found in (("keys", keys), ("masks", masks)) if found}
+
+
+def lost_keys(trial: Trial, motion: Motion | PlayersMotion) -> list[str]:
+    """Return a warning for every frame that is lost although the trial has a key of it."""
+    if isinstance(motion, PlayersMotion):
+        return []
+    lost = set(motion.index[motion.status == Status.LOST.value].tolist())
+    return [
+        f"frame {key.frame} is lost although there is a [[key]] of it: the images do not show the body where the key "
+        "has it; look at the frame and mend the key"
+        for key in trial.key
+        if key.frame in lost
+    ]
 
 
 def _describe_key(key: KeyTable) -> dict[str, Any]:

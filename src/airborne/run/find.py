@@ -12,6 +12,7 @@ import numpy as np
 
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene
 from airborne.body import BodyModel, Pose
+from airborne.body.symmetry import symmetries
 from airborne.errors import TrialError, UndecidedError, count
 from airborne.export import write_json
 from airborne.geometry.rotations import angles_from_matrix
@@ -90,10 +91,13 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
         raise _ask_for_help(trial, model, finding, folder)
     first = finding.candidates[0]
     frame, pose = _track_back(trial, model, recording, finding)
+    chosen = "was found" if take is None else f"is candidate {take}, as --take says"
     note = (
-        f"[start] was found: the body stands out best in frame {finding.moment.frames.index} "
+        f"[start] {chosen}: the body stands out best in frame {finding.moment.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
+    if len(symmetries(model)) > 1:
+        note += "; turned poses of this body look alike, and its angles are those of one of them"
     return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, note)
 
 

@@ -94,7 +94,7 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
     """Name what differs between two identities: the settings with their values there and now, the input files."""
     before, now = recorded.get(name), identity[name]
     if not (isinstance(before, dict) and isinstance(now, dict)):
-        return f"{name} {before}, now {now}" if isinstance(now, str) else f"other {name}"
+        return f"{name} {before}, now {now}" if isinstance(now, str | int) else f"other {name}"
     differing = [key for key in {**before, **now} if before.get(key) != now.get(key)]
     if name == "settings":
         return "; ".join(f"{key} = {before.get(key)}, now {now.get(key)}" for key in differing)
@@ -183,13 +183,20 @@ def require_run_of(trial: Trial, folder: Path) -> None:
         )
 
 
-def run_identity(trial: Trial, *, live: bool = False) -> dict[str, Any]:
-    """Return what two runs share if one can resume the other."""
+def recorded_take(folder: Path) -> int | None:
+    """Return which of the poses that were found the run in a folder was told to take; None where it was told none."""
+    record = folder / RUN_RECORD
+    return read_record(record).get("take") if record.is_file() else None
+
+
+def run_identity(trial: Trial, *, live: bool = False, take: int | None = None) -> dict[str, Any]:
+    """Return what two runs share if one can resume the other; `take` is which of the poses found was chosen."""
     settings = {
         "inputs": input_hashes(trial, live=live),
         **_corrections(trial),
         "settings": trial.track.model_dump(),
         "version": __version__,
+        **({} if take is None else {"take": take}),
     }
     return json.loads(json.dumps(settings))
 

@@ -36,7 +36,7 @@ def write_frame(trial: Trial, camera: str, frame: int, path: Path) -> Size:
     frames = next(iter(recording), None)
     view = None if frames is None else frames.views[names.index(camera)]
     if view is None:
-        raise TrialError(f"{trial.name}: {camera} has no image at frame {frame}; give an earlier frame")
+        raise TrialError(f"{trial.name}: {camera} has no image at frame {frame}{_last(recording.n_images)}")
     try:
         is_written = cv2.imwrite(str(path), np.ascontiguousarray(view.rgb[..., ::-1]))
     except cv2.error:
@@ -44,3 +44,7 @@ def write_frame(trial: Trial, camera: str, frame: int, path: Path) -> Size:
     if not is_written:
         raise TrialError(f"{path}: cannot be written; give a file in an existing folder that ends in .png")
     return view.camera.size
+
+
+def _last(n_images: int | None) -> str:
+    return "; give an earlier frame" if n_images is None else f"; frames are 0 to {n_images - 1}"

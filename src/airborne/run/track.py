@@ -22,11 +22,11 @@ from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion
 from airborne.motion.run_folder import CALIBRATION, SUMMARY
 from airborne.run.body import BodyRun
-from airborne.run.corrections import corrections_of
+from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
-from airborne.run.folder import list_tables, prepare_folder, run_identity
+from airborne.run.folder import list_tables, prepare_folder, recorded_take, run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
@@ -86,6 +86,8 @@ def track_trial(
         refuse_same_files(trial)
     if live and trial.start.find:
         raise ResultError("a live run looks for nobody; give [[start.player]] tables")
+    if resume and take is None:
+        take = recorded_take(folder)
     if take is not None and not trial.start.find:
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")
     started_s = time.monotonic()
@@ -98,7 +100,7 @@ def track_trial(
         if first_frame:
             trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
         drawn = None if not pictures else "stills" if first_frame else "videos"
-        options = _Options(folder, started_s, resume, overwrite, live, drawn, progress)
+        options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress)
         facts = None if found is None else found.facts
         if trial.has_players:
             opened = _open_live(trial, stack, progress) if live else open_trial(trial, facts)
@@ -118,13 +120,14 @@ class _Options:
     overwrite: bool
     live: bool
     drawn: OverlaysAs | None  # None: no pictures
+    take: int | None  # of the poses that were found
     progress: Progress | None
 
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
     folder, recording = options.folder, subject.recording
-    identity = run_identity(subject.trial, live=options.live)
+    identity = run_identity(subject.trial, live=options.live, take=options.take)
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
     write_pose2sim(folder / CALIBRATION, recording.rig)
     read_s = time.monotonic()
@@ -134,7 +137,11 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     motion, summary = subject.finish(folder)
     summary |= corrections_of(subject.trial, motion.index.tolist())
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
-    summary["warnings"] += [*subject.warnings(), *alarms(summary.get("self_check", []))]
+    summary["warnings"] += [
+        *subject.warnings(),
+        *lost_keys(subject.trial, motion),
+        *alarms(summary.get("self_check", [])),
+    ]
     if options.drawn is not None:
         summary["warnings"] += names_not_drawn([subject.trial.name, *recording.rig.names, *subject.names])
     summary["tables"] = list_tables(folder)
