@@ -13,7 +13,7 @@ from airborne.appearance.empty_scene import EmptyScene
 from airborne.body import PosedBody
 from airborne.cameras import Camera
 from airborne.export.mosaic import ColumnTitle, write_mosaic
-from airborne.export.palette import ESTIMATE_RGB
+from airborne.export.palette import ESTIMATE_RGB, SIDE_RGB
 from airborne.export.views import cached_surface_arrays
 from airborne.rendering import FLAT, render
 from airborne.tracking.capsules.surface_colours import class_image
@@ -23,6 +23,7 @@ from airborne.video import Frames, View
 
 _TITLES = ("empty scene", "what stands out", "where the body was found")
 _ASPECT = 0.8  # height over width of a cell: whole images are wider than high
+_TINT = 0.5  # share of a side's colour in that of its limbs
 _MARGIN = 0.6  # around a candidate, as a share of its size
 
 
@@ -41,9 +42,13 @@ def draw_empty_scene(path: Path, moment: Moment, scenes: Mapping[SourceKey, Empt
 
 
 def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, PosedBody]]) -> None:
-    """Draw the outlines of candidates, each with its label, one row a candidate, in every view."""
+    """Draw the outlines of candidates, each with its label, one row a candidate, in every view.
+
+    Limbs of the left and of the right, as the segments' names have them, are tinted in two colours: which way a person
+    faces shows in no outline.
+    """
     views = [view for view in moment.frames.views if view is not None]
-    rows = [[_near(_with_outline(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
+    rows = [[_near(_with_sides(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
     names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
     write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
 
@@ -75,6 +80,16 @@ def _box_of(camera: Camera, states: Sequence[Array]) -> tuple[slice, slice]:
 
 def _with_outline(view: View, posed: PosedBody) -> Image:
     return _outline(view.rgb, render(cached_surface_arrays(posed.model), posed, view.camera, FLAT).mask)
+
+
+def _with_sides(view: View, posed: PosedBody) -> Image:
+    drawn = render(cached_surface_arrays(posed.model), posed, view.camera, FLAT)
+    image = _outline(view.rgb, drawn.mask).astype(float)
+    for side, colour in SIDE_RGB.items():
+        own = [k for k, segment in enumerate(posed.model.segments) if segment.name.endswith(f"_{side}")]
+        shown = np.isin(drawn.segment, own)
+        image[shown] += _TINT * (np.array(colour) - image[shown])
+    return image.astype(np.uint8)
 
 
 def _outline(image: Image, mask: NDArray[np.bool_]) -> Image:

@@ -7,6 +7,7 @@ from airborne.tracking import Status
 STATUS_RGB = {Status.TRACKED: (0, 158, 115), Status.UNCERTAIN: (230, 159, 0), Status.LOST: (213, 94, 0)}
 ESTIMATE_RGB = (0, 114, 178)  # the blue of Okabe and Ito, which the colour-blind tell apart
 REFERENCE_RGB = (30, 30, 30)  # nearly black
+SIDE_RGB = {"left": (230, 159, 0), "right": (86, 180, 233)}  # of a person's limbs
 TEXT_RGB = (51, 51, 51)  # softer than black
 
 

@@ -160,6 +160,7 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
     from airborne.export.finding import draw_candidates
 
     frame, best = finding.moment.frames.index, finding.candidates[0]
+    sides = " (left limbs are orange, right ones blue)" if model.has_joints else ""
     open_candidates(folder)
     write_json(folder / CANDIDATES, _describe(model, finding))
     draw_candidates(
@@ -175,7 +176,7 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
     return UndecidedError(
-        f"{trial.name}: the start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}, then give "
+        f"{trial.name}: the start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}{sides}, then give "
         "--take 1 (or another number), or the pose under [start]"
     )
 
