@@ -71,6 +71,19 @@ def test_no_other_file_is_written_over(tmp_path, monkeypatch, capsys, output, sa
     assert [(tmp_path / name).read_text() for name in ("points.csv", "notes.txt")] == ["mine"] * 2
 
 
+def test_a_video_that_is_given_twice_is_named(tmp_path, monkeypatch, capsys):
+    for name in ("a.mp4", "b.mp4"):
+        (tmp_path / name).write_bytes(b"the same")
+    (tmp_path / "board.toml").write_text("columns = 5")
+    monkeypatch.chdir(tmp_path)
+    words = ("calibrate", "--board", "board.toml", "a.mp4", "b.mp4", "-o", "calib.toml")
+    monkeypatch.setattr("sys.argv", ["airborne", *words])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 2
+    assert "a.mp4 and b.mp4 are the same video" in " ".join(capsys.readouterr().err.split())
+
+
 def test_two_points_mixed_up_stop_tracking_and_the_python_interface(thrown_cross, tmp_path):
     rows = [line.split(",") for line in (thrown_cross / "control_points.csv").read_text().splitlines()]
     u = rows[0].index("cam2_u")

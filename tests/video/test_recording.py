@@ -1,4 +1,5 @@
 import threading
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -6,6 +7,7 @@ import numpy as np
 import pytest
 
 from airborne.video import Recording, VideoSource, open_recording
+from airborne.video.recording import _notes
 from tests.support.clips import SIZE, numbered, numbers_of, packets_of, plain_rig, textured, with_noise, write_clip
 
 
@@ -149,6 +151,11 @@ def test_other_field_orders_than_the_files_flags_are_an_event_not_an_error(tmp_p
     trial = open_recording([VideoSource("cam1", path, "top-first")], plain_rig("cam1"))
     assert trial.events == ["cam1: read as top-first, though the file's flags say progressive"]
     assert len(list(trial)) == 8
+    combs = (
+        "read as progressive, though the file's flags say bottom-first; if edges that move are combs, write fields ="
+    )
+    order = replace(trial.facts[0], fields="progressive", flagged_order="bottom-first")
+    assert f'cam1: {combs} "bottom-first"' in list(_notes(trial.sources, (order,)))
     assert open_recording([VideoSource("cam1", path, "auto")], plain_rig("cam1")).events == [
         "cam1: the file's flags say progressive"
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -127,6 +128,7 @@ def _board_sources(videos: list[Path], board: Path, timestamps: Path | None, fis
     """Return the sources of a board in videos, or in folders of images; cameras are named like these."""
     from airborne.calibration import sources_from
 
+    _refuse_copies(videos)
     media = [{"pictures" if path.is_dir() else "video": str(path.resolve())} for path in videos]
     lens = "fisheye" if fisheye else "brown"
     table = {"file": str(board.resolve()), **({"timestamps": str(timestamps.resolve())} if timestamps else {})}
@@ -141,8 +143,18 @@ def _wand_sources(videos: list[Path], length_m: float | None, size: str | None) 
     if size is not None:
         raise AirborneError("--size goes with a table; videos have their own")
     _check_wand(length_m)
+    _refuse_copies(videos)
     cameras = [{"name": path.stem, "video": str(path.resolve())} for path in videos]
     return sources_from({"camera": cameras, "wand": {"length_m": length_m}}, Path(), "the videos")
+
+
+def _refuse_copies(videos: list[Path]) -> None:
+    """Raise AirborneError where two cameras' videos have the same content."""
+    files = [path for path in videos if path.is_file()]
+    for k, path in enumerate(files):
+        for other in files[:k]:
+            if filecmp.cmp(path, other, shallow=False):
+                raise AirborneError(f"{other} and {path} are the same video; give each camera its own")
 
 
 def _check_wand(length_m: float | None) -> None:
