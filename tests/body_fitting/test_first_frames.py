@@ -64,7 +64,11 @@ def test_person_who_is_uncertain_in_the_first_frame_is_fitted_in_those_after(mon
             yield each, replace(lost_estimate(each.index, each.time_s), status=status, pose=pose)
 
     monkeypatch.setattr(body, "track_frames", track)
+    monkeypatch.setattr(body, "keys_of_frames", lambda trial, model, recording: ({9: model}, []))
     trial = SimpleNamespace(body=SimpleNamespace(preset="human18", mass_kg=MASS_KG), settings=Settings())
     run = BodyRun(trial, Clip(), None, DRESSED, POSE)._fit_shape(SCENE.frames(0))
     assert girths_off(run.model) < 0.5 * girths_off(DRESSED)
     assert run.start is POSE
+    with_key = BodyRun(trial, Clip(), None, DRESSED, POSE, keys={9: DRESSED})._fit_shape(SCENE.frames(0))
+    assert girths_off(with_key.model) == girths_off(run.model)  # a key that is added later changes no body
+    assert with_key.keys == {9: with_key.model}  # it is read anew, for the lengths of this one

@@ -158,7 +158,7 @@ class BodyRun:
             tracker = tracker_of(self.trial.settings, fitted, start)
             at_first = tracker.search(tracker.init(), first).pose
             fitted = fitted if at_first is None else place_landmarks(fitted, at_first, self.points)
-        keys, _ = keys_of_frames(self.trial, fitted, self.recording)
+        keys = keys_of_frames(self.trial, fitted, self.recording)[0] if self.keys else {}
         return replace(self, model=fitted, start=start, keys=keys)
 
     def track(

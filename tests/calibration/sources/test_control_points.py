@@ -48,7 +48,7 @@ def test_the_bundled_points_are_seen_by_three_cameras(points):
         (b"\x89PNG\r\n\x1a\n\xff\xfe", "not a text file"),
         (b"a,b\0c\n1,2\n", "not a text file"),
         (GOOD.replace("z_m", "z_mm"), "no column z_m; found point,x_m,y_m,z_mm"),
-        (GOOD.replace(",", ";"), "no column point, x_m, y_m, z_m"),
+        (GOOD.replace(",", ";"), "separated by semicolons"),
         (GOOD.replace("b_v", "a_v"), "column 'a_v' stands twice"),
         (GOOD.replace("b_v", "b_w"), "column 'b_w' is not <camera>_u or <camera>_v"),
         (GOOD.replace("b_v", "c_v"), "camera 'b' has no column b_v"),
