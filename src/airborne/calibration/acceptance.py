@@ -45,17 +45,16 @@ def write_accepted(
 
 
 def require_plausible(calibration: Calibration | RigCalibration) -> None:
-    """Raise CalibrationError for a calibration that `write_accepted` would reject for its errors."""
-    rig, held_out_px, residual_px = calibration.rig, {}, {}
-    for name in rig.names:
-        if isinstance(calibration, Calibration):
-            fit = calibration.fits[rig.names.index(name)]
-            held_out_px[name], residual_px[name] = np.linalg.norm(fit.held_out_px, axis=1), fit.residual_px
-        else:
-            held_out_px[name] = calibration.held_out_px_of(name)
-    found = isinstance(calibration, Calibration) and [each for each in calibration.findings if each.kind == "outlier"]
+    """Raise CalibrationError, naming points, for a calibration that `write_accepted` would reject for its errors."""
+    rig, outliers = calibration.rig, list[str]()
+    if isinstance(calibration, Calibration):
+        held_out_px = {fit.name: np.linalg.norm(fit.held_out_px, axis=1) for fit in calibration.fits}
+        residual_px = {fit.name: fit.residual_px for fit in calibration.fits}
+        outliers = [finding.what for finding in calibration.findings if finding.kind == "outlier"]
+    else:
+        held_out_px, residual_px = {name: calibration.held_out_px_of(name) for name in rig.names}, {}
     for reason in (*_absurd_errors(rig, held_out_px), *_spoiled_fits(rig, residual_px)):
-        raise CalibrationError("; ".join([reason, *(each.what for each in (found or [])[:_N_NAMED])]))
+        raise CalibrationError("; ".join([reason, *outliers[:_N_NAMED]]))
 
 
 def _spoiled_fits(rig: Rig, residual_px: Mapping[str, Array]) -> Iterator[str]:
