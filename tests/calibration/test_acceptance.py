@@ -84,7 +84,7 @@ def test_a_video_that_is_given_twice_is_named(tmp_path, monkeypatch, capsys):
     assert "a.mp4 and b.mp4 are the same video" in " ".join(capsys.readouterr().err.split())
 
 
-def test_two_points_mixed_up_stop_tracking_and_the_python_interface(thrown_cross, tmp_path):
+def test_two_points_mixed_up_are_named_by_the_python_interface(thrown_cross, tmp_path):
     rows = [line.split(",") for line in (thrown_cross / "control_points.csv").read_text().splitlines()]
     u = rows[0].index("cam2_u")
     one, other = (next(row for row in rows if row[0] == name) for name in ("P13", "P14"))

@@ -86,7 +86,7 @@ def track_trial(
         refuse_same_files(trial)
     if live and trial.start.find:
         raise ResultError("a live run looks for nobody; give [[start.player]] tables")
-    if resume and take is None:
+    if resume and take is None and trial.start.find:
         take = recorded_take(folder)
     if take is not None and not trial.start.find:
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")

@@ -90,15 +90,15 @@ def _numbers(summary: dict[str, Any]) -> None:
                         with ui.element(tag):
                             ui.label(text)
     findings = summary.get("self_check") or []
-    n_alarms = len(alarms(findings))
+    alarming = alarms(findings)
     for text in summary.get("warnings") or []:
-        if text not in alarms(findings):  # which stand below
+        if text not in alarming:  # which stand below
             ui.label(text).classes("warn small")
     for text in describe_corrections(summary):
         ui.label(text).classes("small")
     if findings:
         with ui.expansion(
-            f"{_CHECKED}: {count(n_alarms, 'alarm') if n_alarms else 'no alarm'}", value=n_alarms > 0
+            f"{_CHECKED}: {count(len(alarming), 'alarm') if alarming else 'no alarm'}", value=bool(alarming)
         ).props("dense"):
             for finding in findings:
                 ui.label(finding["sentence"]).classes("bad small" if finding["is_alarm"] else "soft small")
