@@ -182,11 +182,12 @@ def test_a_killed_run_is_readable_and_resumes_to_the_same_bytes(trial, tmp_path)
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_ctrl_c_stops_with_one_line_and_keeps_the_frames(trial, tmp_path):
+@pytest.mark.parametrize("signal_of_stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_ends_with_one_line_and_keeps_the_frames(trial, tmp_path, signal_of_stop):
     long = trial.with_name("long.toml")  # by simplex, slow enough not to end before the signal
     process = start_command("track", long, "-o", tmp_path / "run", "--no-pictures", "--method", "simplex")
     wait_for_rows(process, tmp_path / "run" / "motion.csv", 1)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(signal_of_stop)
     out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     assert out == ""

@@ -4,12 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
 from airborne.errors import ResultError
-from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
+from airborne.io.folder_lock import LOCK, find_writer, refuse_links, sole_writer
 
 HOLD = """
 import sys, time
@@ -51,6 +53,14 @@ def test_the_lock_is_gone_with_its_process_however_it_ends(holder, tmp_path):
     with sole_writer(tmp_path / "run"):
         assert f"process {os.getpid()} on " in (tmp_path / "run" / LOCK).read_text()
     assert not (tmp_path / "run" / LOCK).exists()
+
+
+def test_a_process_that_ended_unnoticed_writes_no_more(holder, tmp_path):
+    assert find_writer(tmp_path / "run") == holder.pid
+    holder.kill()
+    while not Path(f"/proc/{holder.pid}/stat").read_text().split()[2] == "Z":  # as long as nobody waits for it
+        time.sleep(0.01)
+    assert find_writer(tmp_path / "run") is None
 
 
 def test_two_of_one_process_are_two_writers(tmp_path):

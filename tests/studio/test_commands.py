@@ -12,8 +12,9 @@ from airborne.studio.session import Session
 from tests.support.person_run import write_person_run
 
 _WRITES = """
-import pathlib, sys, time
+import pathlib, signal, sys, time
 from airborne.io.folder_lock import sole_writer
+signal.signal(signal.SIGTERM, signal.default_int_handler)
 with sole_writer(pathlib.Path(sys.argv[1])):
     print("writes", flush=True)
     time.sleep(600)

@@ -108,7 +108,7 @@ def pause_tracking(folder):
 def resume_tracking(folder):
     """Let it go on once it has been told to stop."""
     status = Path(f"/proc/{tracking_process(folder)}/status")
-    while not int(re.search(r"^ShdPnd:\s*(\w+)", status.read_text(), re.MULTILINE)[1], 16) >> (signal.SIGINT - 1) & 1:
+    while not int(re.search(r"^ShdPnd:\s*(\w+)", status.read_text(), re.MULTILINE)[1], 16) >> (signal.SIGTERM - 1) & 1:
         time.sleep(0.01)
     os.kill(tracking_process(folder), signal.SIGCONT)
 

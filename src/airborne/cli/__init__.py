@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -92,6 +93,7 @@ def main() -> None:
     """Run the command line; a user's error is one line on stderr and exit code 2."""
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", _MOST_PIXELS)  # read when OpenCV is loaded
     show_notes()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a scheduler's stop is as orderly as Ctrl-C
     try:
         code = app(standalone_mode=False)
         if code == STOPPED:  # typer's answer to Ctrl-C

@@ -63,7 +63,15 @@ def find_writer(folder: Path) -> int | None:
         os.kill(process := int(found[1]), 0)  # raises where there is none
     except (OSError, ValueError, OverflowError):
         return None
-    return process
+    return None if _has_ended(process) else process
+
+
+def _has_ended(process: int) -> bool:
+    """Say whether a process has ended though it is still listed, as nobody has asked how: Linux tells."""
+    try:
+        return Path(f"/proc/{process}/stat").read_bytes().rpartition(b")")[2].split()[0] in (b"Z", b"X")
+    except OSError:
+        return False
 
 
 def _lock(folder: Path) -> int:

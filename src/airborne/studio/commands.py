@@ -101,9 +101,9 @@ class Command:
         return path.is_file() and path.stat().st_mtime >= self._began_s
 
     def stop(self) -> None:
-        """Stop it as Ctrl-C does, and wait for its end."""
+        """Stop it, as in order as by Ctrl-C, and wait for its end."""
         if self.is_running:
-            self._process.send_signal(signal.SIGINT)
+            self._process.terminate()  # Ctrl-C is not heard by what a shell's background started
             try:
                 self._process.wait(_PATIENCE_S)
             except subprocess.TimeoutExpired:
@@ -128,14 +128,13 @@ class OtherProcess:
         """Return None while it goes on, then whether it ended early."""
         return None if find_writer(self._run) == self._number else int(not (self._run / SUMMARY).is_file())
 
-    def send_signal(self, number: int) -> None:
-        """Send it a signal."""
-        with suppress(ProcessLookupError):
-            os.kill(self._number, number)
+    def terminate(self) -> None:
+        """Tell it to end."""
+        self._send(signal.SIGTERM)
 
     def kill(self) -> None:
         """End it at once."""
-        self.send_signal(signal.SIGKILL)
+        self._send(signal.SIGKILL)
 
     def wait(self, timeout: float | None = None) -> None:
         """Wait for its end. Raises TimeoutExpired."""
@@ -144,6 +143,10 @@ class OtherProcess:
             if time.monotonic() > end_s:
                 raise subprocess.TimeoutExpired(str(self._number), timeout or 0.0)
             time.sleep(_SOON_S)
+
+    def _send(self, number: int) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(self._number, number)
 
 
 def find_tracking(folder: Path, trial: Path) -> Command | None:
