@@ -42,7 +42,7 @@ def test_track_prints_what_was_found_and_leaves_every_table(trial, tmp_path, cap
     assert in_process("track", trial, "-o", tmp_path / "run", "--no-pictures", "--cameras", "cam1, cam2") == 0
     out, err = capsys.readouterr()
     assert f"{SHORT} frames at 50 Hz: {SHORT} tracked, 0 uncertain, 0 lost" in out
-    assert all(line.startswith(("tracking ", "compiling ")) for line in err.splitlines())
+    assert all(line.startswith(("tracking ", "airborne: compiling ")) for line in err.splitlines())
     names = set(files_of(tmp_path / "run"))
     assert names == {
         *(
