@@ -1,5 +1,6 @@
 """One writer a folder: a second one is refused while the first holds the lock, and never after it."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -58,9 +59,31 @@ def test_the_lock_is_gone_with_its_process_however_it_ends(holder, tmp_path):
 def test_a_process_that_ended_unnoticed_writes_no_more(holder, tmp_path):
     assert find_writer(tmp_path / "run") == holder.pid
     holder.kill()
-    while not Path(f"/proc/{holder.pid}/stat").read_text().split()[2] == "Z":  # as long as nobody waits for it
+    while Path(f"/proc/{holder.pid}/stat").read_text().split()[2] != "Z":  # as long as nobody waits for it
         time.sleep(0.01)
     assert find_writer(tmp_path / "run") is None
+
+
+def test_a_folder_that_is_removed_while_it_is_looked_at_is_made_anew(tmp_path, monkeypatch):
+    make, tries = Path.mkdir, []
+
+    def make_late(path, *arguments, **options):
+        tries.append(path)
+        if len(tries) == 1:
+            raise FileExistsError(errno.EEXIST, "File exists", str(path))  # and it is gone by now
+        make(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "mkdir", make_late)
+    with sole_writer(tmp_path / "run"):
+        assert tries == [tmp_path / "run"] * 2
+
+
+def test_what_is_no_folder_is_not_waited_for(tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    for path in ("file", "file/run", "link", "link/run"):
+        with pytest.raises(OSError, match=r"link|file"):
+            sole_writer(tmp_path / path).__enter__()
 
 
 def test_two_of_one_process_are_two_writers(tmp_path):

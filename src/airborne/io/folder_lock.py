@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import socket
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -78,7 +79,12 @@ def _lock(folder: Path) -> int:
     """Return the locked file, open, in a folder made if need be; what its last holder has just removed is made anew."""
     path = folder / LOCK
     while True:
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except FileExistsError as error:
+            if error.filename != str(folder) or _is_no_folder(folder):
+                raise
+            continue  # its last holder has removed the folder while it was looked at
         try:
             file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0))
         except FileNotFoundError:  # its last holder has just removed the folder
@@ -95,6 +101,14 @@ def _lock(folder: Path) -> int:
             os.close(file)
             raise _refusal(folder, holder) from None
         os.close(file)
+
+
+def _is_no_folder(path: Path) -> bool:
+    """Say whether something is there that is neither a folder nor a link to one."""
+    try:
+        return not stat.S_ISDIR(path.lstat().st_mode) and not path.is_dir()
+    except FileNotFoundError:
+        return False
 
 
 def _refusal(folder: Path, holder: str) -> InUseError:
