@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, csr_array, diags_array
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial.transform import Rotation
 
+from airborne.calibration.bundle.layout import Layout
 from airborne.calibration.bundle.lenses import N_PARAMETERS, cross_matrices, project, project_with_jacobian
 from airborne.calibration.bundle.problem import Problem, State
 from airborne.types import Array, Ints
@@ -19,10 +20,14 @@ _RIDGE = 1e-13  # of a diagonal: regularises unobserved parameters
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Jacobian:
-    """Derivatives of the residuals' predictions, unweighted: two rows an observation, then one a length, one a lag."""
+    """Derivatives of the residuals' predictions, unweighted; `Layout` has their columns.
 
-    by_camera: csr_array  # (rows, camera columns)
-    by_other: csr_array  # (rows, other columns)
+    That of a lag is 1, by itself.
+    """
+
+    by_camera: Array  # (n, 2, p) of the pixels by the camera
+    by_other: Array  # (n, 2, q) by the target or point, and by the lag
+    by_ends: Array  # (k, 6) of the lengths by their ends
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +37,7 @@ class NormalEquations:
     cameras: Array  # (c, c)
     coupling: Array  # (c, o)
     others: csc_array  # (o, o)
+    diagonal: Ints  # (o,) places of the others' diagonal among their values
     camera_rhs: Array  # (c,), minus the gradient
     other_rhs: Array  # (o,)
 
@@ -43,9 +49,10 @@ class NormalEquations:
         cameras = self.cameras + damping * np.diag(np.diag(self.cameras))
         if not len(self.other_rhs):
             return cameras, self.camera_rhs, None, np.zeros((0, len(cameras)))
-        diagonal = self.others.diagonal()
+        others = self.others.copy()
+        others.data[self.diagonal] += others.data[self.diagonal] * (damping + _RIDGE) + 1e-30
         factors = splu(
-            csc_array(self.others + diags_array(diagonal * (damping + _RIDGE) + 1e-30)),
+            others,
             permc_spec="NATURAL",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
@@ -95,63 +102,74 @@ def length_residual_m(problem: Problem, state: State) -> Array:
 
 
 def jacobian_of(problem: Problem, state: State) -> Jacobian:
-    """Return the derivatives of the projections, lengths and lags by the free parameters."""
-    i, n, k = problem.camera, len(problem.px), len(problem.length_m)
-    n_rows = 2 * n + k + len(problem.lag_sd_s)
+    """Return the derivatives of the projections and lengths by the free parameters."""
+    i, layout = problem.camera, problem.layout
     world, arm, displacement = _points_at_moments(problem, state)
     world = world + np.cross(displacement[:, :3], arm) + displacement[:, 3:]
     _, by_camera, by_world = project_with_jacobian(
         state.R[i], state.centre[i], state.intrinsics[i], is_fisheye=problem.is_fisheye[i], world=world
     )
-    by_camera[:, :, 7] *= _focal_ratio(problem, state)[i, None]
-    entries = [_entries(by_camera, np.broadcast_to(problem.camera_columns[i][:, None], by_camera.shape), np.arange(n))]
-    cameras = _matrix(entries, n_rows, problem.n_camera_columns)
-    others = []
+    columns = problem.camera_columns
+    is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
+    ratio = np.where(is_square, state.intrinsics[:, 1] / state.intrinsics[:, 0], 0.0)
+    by_camera[:, :, 6] += by_camera[:, :, 7] * ratio[i, None]
+    by_other = np.zeros((len(i), 2, 7))
+    by_other[:, :, :3] = by_world
     on_target = np.flatnonzero(problem.moment >= 0)
     if len(on_target):
         by_arm = by_world[on_target] + by_world[on_target] @ cross_matrices(displacement[on_target, :3])
-        by_target = np.concatenate([-by_arm @ cross_matrices(arm[on_target]), by_world[on_target]], axis=2)
-        columns = problem.target_columns[problem.moment[on_target]]
-        others.append(_entries(by_target, np.broadcast_to(columns[:, None], by_target.shape), on_target))
-    in_world = np.flatnonzero((problem.moment < 0) & (problem.point_columns[problem.point] >= 0).any(axis=1))
-    if len(in_world):
-        columns = problem.point_columns[problem.point[in_world]]
-        others.append(_entries(by_world[in_world], np.broadcast_to(columns[:, None], (len(in_world), 2, 3)), in_world))
+        by_other[on_target, :, :3] = -by_arm @ cross_matrices(arm[on_target])
+        by_other[on_target, :, 3:6] = by_world[on_target]
     late = np.flatnonzero(problem.lag >= 0)
     if len(late):
         path = state.target_paths[problem.moment[late]]
         rate = path[:, 0] + 2 * state.lags[problem.lag[late], None] * path[:, 1]
-        by_lag = by_world[late] @ (np.cross(rate[:, :3], arm[late]) + rate[:, 3:])[:, :, None]
-        columns = problem.lag_columns[problem.lag[late]]
-        others.append(_entries(by_lag, np.broadcast_to(columns[:, None, None], by_lag.shape), late))
-        lags = np.arange(len(problem.lag_sd_s))
-        others.append((np.ones(len(lags)), 2 * n + k + lags, problem.lag_columns))
-    if k:
-        ends = state.points[problem.length_ends]
-        along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)[:, None]
-        rows = np.repeat(2 * n + np.arange(k)[:, None], 3, axis=1)
-        for values, end in ((-along, 0), (along, 1)):
-            others.append((values, rows, problem.point_columns[problem.length_ends[:, end]]))
-    return Jacobian(cameras, _matrix(others, n_rows, problem.n_other_columns))
-
-
-def normal_equations(jacobian: Jacobian, row_weights: Array, residuals: Array) -> NormalEquations:
-    """Return the normal equations of rows with weights (rows,) and residuals (rows,), 0 for missing ones."""
-    weighted = _scale_rows(jacobian.by_camera, row_weights)
-    weighted_others = _scale_rows(jacobian.by_other, row_weights)
-    return NormalEquations(
-        cameras=(jacobian.by_camera.T @ weighted).toarray(),
-        coupling=(weighted.T @ jacobian.by_other).toarray(),
-        others=csc_array(jacobian.by_other.T @ weighted_others),
-        camera_rhs=weighted.T @ residuals,
-        other_rhs=weighted_others.T @ residuals,
+        by_other[late, :, 6] = np.einsum("nij,nj->ni", by_world[late], np.cross(rate[:, :3], arm[late]) + rate[:, 3:])
+    ends = state.points[problem.length_ends]
+    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1)[:, None]
+    return Jacobian(
+        by_camera=by_camera[:, :, layout.parameters],
+        by_other=by_other[:, :, layout.other_parameters],
+        by_ends=np.concatenate([-along, along], axis=1),
     )
 
 
-def _scale_rows(rows: csr_array, weights: Array) -> csr_array:
-    """Return every row times its weight."""
-    data = rows.data * np.repeat(weights, np.diff(rows.indptr))
-    return csr_array((data, rows.indices, rows.indptr), shape=rows.shape)
+def normal_equations(layout: Layout, jacobian: Jacobian, row_weights: Array, residuals: Array) -> NormalEquations:
+    """Return the normal equations of rows with weights (rows,) and residuals (rows,), 0 for missing ones.
+
+    Two rows an observation, then one a length, one a lag.
+    """
+    n, k = 2 * len(layout.order), len(layout.ends)
+    weights, r = np.split(row_weights, [n, n + k]), np.split(row_weights * residuals, [n, n + k])
+    by_other = np.swapaxes(jacobian.by_other, 1, 2)
+    weighted = jacobian.by_other * weights[0].reshape(-1, 2, 1)
+    ends = jacobian.by_ends
+    others = [
+        layout.sum_groups(by_other @ weighted),
+        ends[:, :, None] * (weights[1][:, None] * ends)[:, None],
+        weights[2],
+    ]
+    coupling = layout.sum_groups(np.swapaxes(jacobian.by_camera, 1, 2) @ weighted)
+    pixels = r[0].reshape(-1, 2, 1)
+    return NormalEquations(
+        cameras=camera_equations(layout, jacobian, row_weights),
+        coupling=layout.couple(coupling),
+        others=layout.others.matrix(others),
+        diagonal=layout.others.diagonal,
+        camera_rhs=layout.sum_cameras((jacobian.by_camera * pixels).sum(axis=1)),
+        other_rhs=layout.sum_others((jacobian.by_other * pixels).sum(axis=1), ends * r[1][:, None], r[2]),
+    )
+
+
+def camera_equations(layout: Layout, jacobian: Jacobian, row_weights: Array) -> Array:
+    """Return the cameras' block of the normal equations: (camera columns, camera columns)."""
+    n, total = layout.n_camera_columns, np.zeros((layout.n_camera_columns + 1,) * 2)
+    by_camera, weights = jacobian.by_camera[layout.order], row_weights[: 2 * len(layout.order)].reshape(-1, 2, 1)
+    weighted = weights[layout.order] * by_camera
+    for columns, first, end in zip(layout.cameras, layout.camera_starts, layout.camera_starts[1:], strict=False):
+        J, weighted_J = (part[first:end].reshape(2 * (end - first), len(columns)) for part in (by_camera, weighted))
+        total[np.ix_(columns, columns)] += J.T @ weighted_J  # the last row and column: -1, of what is fixed
+    return total[:n, :n]
 
 
 def gauge_directions(problem: Problem, state: State, normal: NormalEquations, reduced: Array) -> Array:
@@ -189,24 +207,3 @@ def gauge_directions(problem: Problem, state: State, normal: NormalEquations, re
 def rotation_vectors_from(start: Array, now: Array) -> Array:
     """Return the rotation vectors (n, 3) [rad] from start to now (n, 3, 3), about the camera's own axes."""
     return Rotation.from_matrix(now @ np.swapaxes(start, 1, 2)).as_rotvec()
-
-
-def _focal_ratio(problem: Problem, state: State) -> Array:
-    """Return fy / fx where they share a column, else 1: (cameras,)."""
-    columns = problem.camera_columns
-    is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
-    return np.where(is_square, state.intrinsics[:, 1] / state.intrinsics[:, 0], 1.0)
-
-
-def _entries(values: Array, columns: Ints, observation: Ints) -> tuple[Array, Ints, Ints]:
-    rows = 2 * observation[:, None, None] + np.arange(2)[None, :, None]
-    return values, np.broadcast_to(rows, values.shape), columns
-
-
-def _matrix(entries: list[tuple[Array, Ints, Ints]], n_rows: int, n_columns: int) -> csr_array:
-    values, rows, columns = (
-        np.concatenate([np.zeros(0), *(np.ravel(entry[part]) for entry in entries)]) for part in range(3)
-    )
-    keep = columns >= 0
-    shape = (n_rows, n_columns)
-    return csr_array(coo_array((values[keep], (rows[keep].astype(int), columns[keep].astype(int))), shape=shape))

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration.bundle.lenses import N_PARAMETERS, intrinsics_of
+from airborne.calibration.bundle.layout import Layout, columns_of_rows, number_parameters
+from airborne.calibration.bundle.lenses import intrinsics_of
 from airborne.calibration.bundle.source import FreeParameters, Source
 from airborne.cameras.camera import Camera, Rig
 from airborne.types import Array, Ints
@@ -45,6 +46,7 @@ class Problem:
     source: Ints  # (n,)
     cluster: Ints  # (n,), numbered over all sources; -1: none
     is_used: NDArray[np.bool_]  # (n,) whether the observation constrains the unknowns
+    layout: Layout
     camera_columns: Ints  # (cameras, 18)
     target_columns: Ints  # (m, 6): rotation about the world's axes [rad], shift [m]
     point_columns: Ints  # (p, 3)
@@ -90,6 +92,15 @@ def build_problem(rig: Rig, sources: Sequence[Source], free_parameters: Mapping[
         for columns, first in ((target_columns, moments), (point_columns, points)):
             own = columns[first[i] : first[i + 1]]
             source_of_column[own[own >= 0]] = i
+    camera_columns, lag_columns = number_parameters(rig, free_parameters), n_others + np.arange(len(lag_sd_s))
+    layout = Layout.of(
+        camera,
+        camera_columns=camera_columns,
+        other=columns_of_rows(moment, point, lag, of_target=target_columns, of_point=point_columns, of_lag=lag_columns),
+        ends=point_columns[length_ends].reshape(-1, 6),
+        lags=lag_columns,
+        n_others=len(source_of_column),
+    )
     is_free_point = np.concatenate([np.zeros(0, bool), *(s.free_coordinates.any(axis=1) for s in sources)])
     is_undetermined = (is_free_point & (point_columns < 0).all(axis=1))[point]
     return Problem(
@@ -102,7 +113,8 @@ def build_problem(rig: Rig, sources: Sequence[Source], free_parameters: Mapping[
         source=np.repeat(np.arange(len(sources)), [len(s.px) for s in sources]),
         cluster=_clusters(sources),
         is_used=~is_undetermined,
-        camera_columns=_camera_columns(rig, free_parameters),
+        layout=layout,
+        camera_columns=camera_columns,
         target_columns=target_columns,
         point_columns=point_columns,
         source_of_column=source_of_column,
@@ -110,7 +122,7 @@ def build_problem(rig: Rig, sources: Sequence[Source], free_parameters: Mapping[
         length_m=np.concatenate([np.zeros(0), *(x.length_m for _, x, _ in lengths)]),
         length_sd_m=np.concatenate([np.zeros(0), *(np.broadcast_to(x.sd_m, len(x.first)) for _, x, _ in lengths)]),
         lag=lag,
-        lag_columns=n_others + np.arange(len(lag_sd_s)),
+        lag_columns=lag_columns,
         lag_sd_s=lag_sd_s,
         lag_source=lag_source,
         time_s=np.concatenate([np.zeros(0), *(_times(s) for s in sources)]),
@@ -218,26 +230,6 @@ def _keep_focal_ratio(state: State, change: Array, columns: Ints) -> Array:
     change = change.copy()
     change[:, 1] = np.where(is_square, change[:, 0] * ratio, change[:, 1])
     return change
-
-
-def _camera_columns(rig: Rig, free_parameters: Mapping[str, FreeParameters]) -> Ints:
-    columns = np.full((len(rig), N_PARAMETERS), -1)
-    shared: dict[str, int] = {}
-    n = 0
-    for row, camera in zip(columns, rig, strict=True):
-        own = free_parameters[camera.name]
-        for number in own.parameters(camera.lens):
-            if number in (6, 7) and own.shares_focal:
-                key = f"{own.shares_focal} {number}"
-                if key in shared:
-                    row[number] = shared[key]
-                    continue
-                shared[key] = n
-            row[number] = n
-            n += 1
-        if own.focal and own.square_pixels:
-            row[7] = row[6]
-    return columns
 
 
 def _is_determined(

@@ -94,7 +94,7 @@ class RobustFit:
         )
         rows = np.concatenate([np.nan_to_num(residual).ravel(), length_residual_m(problem, state), -state.lags])
         jacobian = jacobian_of(problem, state)
-        normal = normal_equations(jacobian, row_weights, rows)
+        normal = normal_equations(problem.layout, jacobian, row_weights, rows)
         return Linearisation(residual, weight, row_weights, rows, jacobian, self._with_prior(normal, state))
 
     def cost(self, state: State, noise: Noise) -> float:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_array
 from scipy.sparse.linalg import SuperLU
 
-from airborne.calibration.bundle.equations import Jacobian, NormalEquations, gauge_directions
+from airborne.calibration.bundle.equations import Jacobian, NormalEquations, camera_equations, gauge_directions
+from airborne.calibration.bundle.layout import Layout
 from airborne.calibration.bundle.loss import Loss, loss_constants
 from airborne.calibration.bundle.problem import Problem, State
 from airborne.types import Array
@@ -35,14 +35,15 @@ class Uncertainty:
 
         Of one coordinate, RMS over the observations of the camera.
         """
-        rows = jacobian.by_camera[: 2 * len(problem.px)]
-        variance = np.asarray((rows @ self.covariance) * rows.toarray()).sum(axis=1) if rows.shape[1] else np.zeros(0)
-        is_used = np.repeat(problem.is_used, 2)
-        camera = np.repeat(problem.camera, 2)
-        shifts = [
-            variance[is_used & (camera == i)] if len(variance) else variance for i in range(len(problem.is_fisheye))
-        ]
-        return np.array([np.sqrt(max(shift.mean(), 0.0)) if len(shift) else 0.0 for shift in shifts])
+        layout, c = problem.layout, len(self.covariance)
+        covariance = np.zeros((c + 1, c + 1))  # the last row and column: -1, of what is fixed
+        covariance[:c, :c] = self.covariance
+        shifts = []
+        for i, columns in enumerate(layout.cameras):
+            rows = jacobian.by_camera[problem.is_used & (problem.camera == i)]
+            variance = np.sum(rows @ covariance[np.ix_(columns, columns)] * rows, axis=-1)
+            shifts.append(np.sqrt(max(variance.mean(), 0.0)) if variance.size else 0.0)
+        return np.array(shifts)
 
 
 def gauge_fixed_inverse(reduced: Array, gauge: Array) -> Array:
@@ -78,31 +79,34 @@ def redundancies(
         gauge_fixed_inverse(reduced, gauge_directions(problem, state, normal, reduced)) if len(reduced) else reduced
     )
     redundancy = np.zeros(n_sources)
-    leverage = weights[n:] * _leverages(jacobian.by_other[n:], factors, back, inverse)
+    leverage = weights[n:] * _leverages(problem.layout, jacobian, factors, back, inverse)
     for i in range(n_sources):
         rows, columns = source_of_row == i, problem.source_of_column == i
         n_used = (rows[:n] & np.repeat(problem.is_used, 2)).sum()
-        by_camera = jacobian.by_camera[rows]
-        share = (by_camera.T @ (by_camera * weights[rows][:, None])).toarray() - normal.coupling[:, columns] @ back[
-            columns
-        ]
+        share = camera_equations(problem.layout, jacobian, np.where(rows, weights, 0.0))
+        share -= normal.coupling[:, columns] @ back[columns]
         redundancy[i] = n_used - columns.sum() - np.sum(share * inverse) + leverage[rows[n:]].sum()
     return np.maximum(redundancy, 1.0)
 
 
-def _leverages(rows: csr_array, factors: SuperLU | None, back: Array, inverse: Array) -> Array:
-    """Return `a N^-1 a^T` of rows a (k, others) that involve no camera: (k,)."""
-    if factors is None or not len(back) or not rows.indptr[-1]:
-        return np.zeros(len(rows.indptr) - 1)
-    leverages = []
-    for first in range(0, len(rows.indptr) - 1, _MOST_ROWS_AT_ONCE):
-        part = rows[first : first + _MOST_ROWS_AT_ONCE]
-        dense = part.toarray()
-        through = np.asarray(part @ back)
-        leverages.append(
-            np.einsum("ko,ok->k", dense, factors.solve(dense.T)) + np.sum(through @ inverse * through, axis=1)
+def _leverages(layout: Layout, jacobian: Jacobian, factors: SuperLU | None, back: Array, inverse: Array) -> Array:
+    """Return `a N^-1 a^T` of the rows a of lengths and lags, which involve no camera: (k + l,)."""
+    k, n_rows = len(layout.ends), len(layout.ends) + len(layout.lags)
+    leverages = np.zeros(n_rows)
+    if factors is None:
+        return leverages
+    for first in range(0, n_rows, _MOST_ROWS_AT_ONCE):
+        rows = np.arange(first, min(first + _MOST_ROWS_AT_ONCE, n_rows))
+        ends, late = rows[rows < k], rows[rows >= k]
+        dense = np.zeros((len(rows), len(back) + 1))  # the last column: -1, of what is fixed
+        np.add.at(dense, (ends[:, None] - first, layout.ends[ends]), jacobian.by_ends[ends])
+        dense[late - first, layout.lags[late - k]] = 1.0
+        dense = dense[:, :-1]
+        through = dense @ back
+        leverages[rows] = np.einsum("ko,ok->k", dense, factors.solve(dense.T)) + np.sum(
+            through @ inverse * through, axis=1
         )
-    return np.concatenate(leverages)
+    return leverages
 
 
 def estimate_uncertainty(
@@ -129,11 +133,10 @@ def estimate_uncertainty(
     n_clusters = int(problem.cluster.max(initial=-1)) + 1
     if n_clusters >= _FEWEST_CLUSTERS:
         n = 2 * len(problem.px)
-        effect = jacobian.by_camera[:n].toarray() - np.asarray(jacobian.by_other[:n] @ back)
-        score = ((weights * residuals)[:n, None] * effect).reshape(-1, 2, effect.shape[1]).sum(axis=1)
+        score = _scores(problem, jacobian, (weights * residuals)[:n].reshape(-1, 2, 1), back)
         single = problem.cluster < 0
         groups = np.where(single, n_clusters + np.cumsum(single) - 1, problem.cluster)
-        sums = np.zeros((int(groups.max()) + 1, effect.shape[1]))
+        sums = np.zeros((int(groups.max()) + 1, len(reduced)))
         np.add.at(sums, groups, score)
         n_used = 2 * problem.is_used.sum()
         correction = n_clusters / (n_clusters - 1) * n_used / max(n_used - problem.n_other_columns - len(reduced), 1)
@@ -141,3 +144,17 @@ def estimate_uncertainty(
         factor = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(covariance), 1e-300), 1.0))
         covariance = factor[:, None] * covariance * factor
     return Uncertainty(covariance, bool(gauge.shape[1]))
+
+
+def _scores(problem: Problem, jacobian: Jacobian, pulls: Array, back: Array) -> Array:
+    """Return by how much each observation, with the others eliminated, pulls at the cameras: (n, camera columns).
+
+    pulls (n, 2, 1): weighted residuals.
+    """
+    layout, n_columns = problem.layout, problem.n_camera_columns
+    scores = np.zeros((len(pulls), n_columns + 1))  # the last column: -1, of what is fixed
+    np.put_along_axis(scores, layout.cameras[problem.camera], np.sum(jacobian.by_camera * pulls, axis=1), axis=1)
+    back, by_other = np.vstack([back, np.zeros(n_columns)]), np.sum(jacobian.by_other * pulls, axis=1)
+    for k in range(by_other.shape[1]):
+        scores[:, :-1] -= by_other[:, [k]] * back[layout.other[:, k]]
+    return scores[:, :-1]
