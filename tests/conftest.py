@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from airborne.io.environment import set_up_libraries
+
+set_up_libraries()  # as the command line does
+
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
 from tests.support.places import ROOT

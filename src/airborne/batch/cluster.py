@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from airborne.batch.task import Report, Task, TaskOutcome, do_task
 from airborne.errors import AirborneError, count
+from airborne.io.environment import ONE_THREAD
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -23,7 +24,6 @@ _TOPIC = "airborne"  # of the events that tell of frames
 _LEAST_BYTES = 500_000_000  # a worker takes 300 MB with everything loaded
 _CONNECT_S = 10  # to reach a scheduler
 _DASHBOARD = "127.0.0.1:0"  # for this machine alone, on any port
-_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # each worker has
 _FORKS = sys.platform == "linux"  # elsewhere a forked process may not use what its parent has loaded
 # one task runs, none waits at a worker: the longest go first, and a dead worker costs what it ran; only many deaths are
 # a task's own fault; a worker that is killed again while it starts is not given up
@@ -49,8 +49,8 @@ def import_for_workers() -> None:
     if not _FORKS:
         return
     multiprocessing.get_context("forkserver").set_forkserver_preload([do_task.__module__, "distributed.nanny"])
-    known = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    known = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
     try:
         forkserver.ensure_running()
     finally:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import signal
 import sys
 from pathlib import Path
@@ -27,8 +26,8 @@ from airborne.cli.smooth import smooth_command
 from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
 from airborne.errors import STOPPED, UNDECIDED, AirborneError, UndecidedError
+from airborne.io.environment import set_up_libraries
 
-_MOST_PIXELS = "150000000"  # of a picture that OpenCV decodes, as of a video's; a file may declare any number
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _STEPS = {  # in the order of the work
     "Begin": {"demo": track.demo_command, "studio": studio_command},
@@ -91,7 +90,7 @@ app.add_typer(_group(_REPRODUCE, "Repeat a paper's experiment: its table beside 
 
 def main() -> None:
     """Run the command line; a user's error is one line on stderr and exit code 2."""
-    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", _MOST_PIXELS)  # read when OpenCV is loaded
+    set_up_libraries()
     show_notes()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a scheduler's stop is as orderly as Ctrl-C
     try:

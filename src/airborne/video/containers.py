@@ -16,12 +16,12 @@ from av.error import FFmpegError, InvalidDataError
 from av.video.stream import VideoStream
 
 from airborne.errors import VideoError
+from airborne.io.environment import MOST_PIXELS
 
 _KINDS = (  # of container, as FFmpeg names them; none opens a second file
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,vvc,av1,obu,ivf,mxf,gxf,asf,flv,"
     "live_flv,ogg,nut,dv,cine,mjpeg,mjpeg_2000,mpjpeg,yuv4mpegpipe,vc1,dirac,wav,w64,aiff,caf,flac,mp3,aac,ac3"
 )
-_MOST_PIXELS = 150_000_000  # of a picture; a file may declare any number
 _SILENCE_S = 10.0  # after which a camera on the network counts as gone
 
 
@@ -76,7 +76,7 @@ def video_stream(container: InputContainer) -> VideoStream | None:
         return None
     stream = container.streams.video[0]
     stream.thread_type = "NONE"
-    stream.codec_context.options = {"max_pixels": str(_MOST_PIXELS)}
+    stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
     return stream
 
 
