@@ -1,5 +1,6 @@
 """A calibration that predicts absurdly, or that cannot be read back, gets another name."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,11 @@ import pytest
 
 import airborne
 from airborne import cli
-from airborne.calibration.acceptance import write_accepted
+from airborne.calibration.acceptance import Errors, write_accepted
 from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError, CalibrationError
 from tests.support.cameras import three_cameras
+from tests.support.commands import in_process
 
 RIG = three_cameras()
 ERRORS = dict.fromkeys(RIG.names, 0.5)
@@ -18,7 +20,7 @@ GOOD = {name: np.full(20, 0.7) for name in RIG.names}
 
 
 def test_a_good_calibration_is_written_under_its_name(tmp_path):
-    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=GOOD)
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, GOOD))
     assert (written, reasons) == (tmp_path / "calib.toml", ())
     assert [path.name for path in tmp_path.iterdir()] == ["calib.toml"]
     assert read_rig(written).names == RIG.names
@@ -27,7 +29,7 @@ def test_a_good_calibration_is_written_under_its_name(tmp_path):
 def test_an_absurd_left_out_error_is_named_and_the_old_file_stays(tmp_path):
     (tmp_path / "calib.toml").write_text("an older one")
     absurd = GOOD | {RIG.names[1]: np.r_[np.full(14, 0.5), np.full(6, 300.0)]}
-    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=absurd)
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, absurd))
     assert written == tmp_path / "calib.rejected.toml" and written.exists()
     assert (tmp_path / "calib.toml").read_text() == "an older one"
     assert len(reasons) == 1 and reasons[0].startswith(f"{RIG.names[1]}: what is left out of the fit lies 164 px")
@@ -37,16 +39,14 @@ def test_a_few_wrong_clicks_and_errors_that_are_unknown_are_no_reason(tmp_path):
     some = np.r_[np.full(17, 0.5), np.full(3, 300.0)]
     unknown = np.full(20, np.nan)
     held_out_px = dict(zip(RIG.names, (some, unknown, some), strict=True))
-    assert write_accepted(tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=held_out_px)[1] == ()
+    assert write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, held_out_px))[1] == ()
 
 
 def test_one_point_that_spoils_a_fit_of_least_squares_is_a_reason(tmp_path):
     residual_px = {name: np.full((20, 2), 0.5) for name in RIG.names}
     residual_px[RIG.names[0]][3] = (90.0, 0.0)
     residual_px[RIG.names[1]][4] = np.nan
-    written, reasons = write_accepted(
-        tmp_path / "calib.toml", RIG, errors_px=ERRORS, held_out_px=GOOD, residual_px=residual_px
-    )
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, GOOD, residual_px))
     assert written.name == "calib.rejected.toml"
     assert len(reasons) == 1 and reasons[0].startswith(f"{RIG.names[0]}: a control point lies 90 px from where")
 
@@ -84,12 +84,29 @@ def test_a_video_that_is_given_twice_is_named(tmp_path, monkeypatch, capsys):
     assert "a.mp4 and b.mp4 are the same video" in " ".join(capsys.readouterr().err.split())
 
 
-def test_two_points_mixed_up_are_named_by_the_python_interface(thrown_cross, tmp_path):
+def write_mixed_up(thrown_cross, path):
+    """Write the example's control points with two of them mixed up in one camera."""
     rows = [line.split(",") for line in (thrown_cross / "control_points.csv").read_text().splitlines()]
     u = rows[0].index("cam2_u")
     one, other = (next(row for row in rows if row[0] == name) for name in ("P13", "P14"))
     one[u : u + 2], other[u : u + 2] = other[u : u + 2], one[u : u + 2]
-    (tmp_path / "mixed.csv").write_text("\n".join(map(",".join, rows)) + "\n")
+    path.write_text("\n".join(map(",".join, rows)) + "\n")
+
+
+@pytest.mark.parametrize("words", [("check",), ("track", "-o", "run", "--no-pictures")])
+def test_no_trial_is_tracked_with_two_points_mixed_up(thrown_cross, tmp_path, capsys, monkeypatch, words):
+    for path in thrown_cross.iterdir():
+        (tmp_path / path.name).symlink_to(path)
+    (tmp_path / "control_points.csv").unlink()
+    write_mixed_up(thrown_cross, tmp_path / "control_points.csv")
+    monkeypatch.chdir(tmp_path)
+    assert in_process(words[0], "trial.toml", *words[1:]) == 2
+    assert re.search(r"'P1[34]' misses by .*'P1[34]' misses by", capsys.readouterr().err)
+    assert not (tmp_path / "run").exists()
+
+
+def test_two_points_mixed_up_are_named_by_the_python_interface(thrown_cross, tmp_path):
+    write_mixed_up(thrown_cross, tmp_path / "mixed.csv")
     with pytest.raises(CalibrationError, match=r"'P1[34]' misses by .*'P1[34]' misses by"):
         airborne.calibrate(tmp_path / "mixed.csv", sizes=(768, 576))
     with pytest.raises(AirborneError, match=r"expected .width, height. in pixels"):
@@ -99,7 +116,7 @@ def test_two_points_mixed_up_are_named_by_the_python_interface(thrown_cross, tmp
 def test_what_our_reader_refuses_is_rejected(tmp_path):
     far = Rig(tuple(replace(c, camera_from_world=c.camera_from_world) for c in RIG))
     scaled = Rig(tuple(_far(camera, 1000.0) for camera in far))
-    written, reasons = write_accepted(tmp_path / "calib.toml", scaled, errors_px=ERRORS, held_out_px=GOOD)
+    written, reasons = write_accepted(tmp_path / "calib.toml", scaled, Errors(ERRORS, GOOD))
     assert written.name == "calib.rejected.toml"
     assert "cannot be read back" in reasons[0]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,22 +21,34 @@ _N_NAMED = 3  # outliers in a message
 _FEWEST = 8  # left-out errors of a camera that can be judged
 
 
-def write_accepted(
-    path: Path,
-    rig: Rig,
-    *,
-    errors_px: Mapping[str, float],
-    held_out_px: Mapping[str, Array],
-    residual_px: Mapping[str, Array] | None = None,
-) -> tuple[Path, tuple[str, ...]]:
-    """Write a rig as Pose2Sim TOML; return where, and why it was rejected: then it stands beside, under another name.
+class Errors(NamedTuple):
+    """What a calibration misses, by camera."""
 
-    errors_px: RMS by camera; held_out_px: by camera, distances (n,) of left-out observations from their predictions;
-    residual_px: of all from the fit (n, 2), where it is one of least squares, which a single wrong point spoils.
-    """
+    rms_px: Mapping[str, float]
+    held_out_px: Mapping[str, Array]  # (n,) distances of left-out observations from their predictions
+    residual_px: Mapping[str, Array] = {}  # (n, 2) of a fit by least squares, which a single wrong point spoils
+
+    @classmethod
+    def of(cls, calibration: Calibration | RigCalibration) -> Errors:
+        """Return those of a calibration from control points, or from sources."""
+        if isinstance(calibration, Calibration):
+            return cls(
+                rms_px={fit.name: fit.rms_px for fit in calibration.fits},
+                held_out_px={fit.name: np.linalg.norm(fit.held_out_px, axis=1) for fit in calibration.fits},
+                residual_px={fit.name: fit.residual_px for fit in calibration.fits},
+            )
+        names = calibration.rig.names
+        return cls(
+            rms_px={name: np.nan_to_num(calibration.adjustment.rms_px(camera=i)) for i, name in enumerate(names)},
+            held_out_px={name: calibration.held_out_px_of(name) for name in names},
+        )
+
+
+def write_accepted(path: Path, rig: Rig, missed: Errors) -> tuple[Path, tuple[str, ...]]:
+    """Write a rig as Pose2Sim TOML; return where, and why it was rejected: then it has another name, beside."""
     rejected = path.with_name(f"{path.stem}.rejected{path.suffix}")
-    reasons = [*_absurd_errors(rig, held_out_px), *_spoiled_fits(rig, residual_px or {})]
-    write_pose2sim(rejected, rig, errors_px=errors_px)
+    reasons = list(_reasons(rig, missed))
+    write_pose2sim(rejected, rig, errors_px=missed.rms_px)
     try:
         read_rig(rejected)
     except CalibrationError as error:
@@ -46,15 +58,15 @@ def write_accepted(
 
 def require_plausible(calibration: Calibration | RigCalibration) -> None:
     """Raise CalibrationError, naming points, for a calibration that `write_accepted` would reject for its errors."""
-    rig, outliers = calibration.rig, list[str]()
-    if isinstance(calibration, Calibration):
-        held_out_px = {fit.name: np.linalg.norm(fit.held_out_px, axis=1) for fit in calibration.fits}
-        residual_px = {fit.name: fit.residual_px for fit in calibration.fits}
-        outliers = [finding.what for finding in calibration.findings if finding.kind == "outlier"]
-    else:
-        held_out_px, residual_px = {name: calibration.held_out_px_of(name) for name in rig.names}, {}
-    for reason in (*_absurd_errors(rig, held_out_px), *_spoiled_fits(rig, residual_px)):
+    found = calibration.findings if isinstance(calibration, Calibration) else ()
+    outliers = [finding.what for finding in found if finding.kind == "outlier"]
+    for reason in _reasons(calibration.rig, Errors.of(calibration)):
         raise CalibrationError("; ".join([reason, *outliers[:_N_NAMED]]))
+
+
+def _reasons(rig: Rig, missed: Errors) -> Iterator[str]:
+    yield from _absurd_errors(rig, missed.held_out_px)
+    yield from _spoiled_fits(rig, missed.residual_px)
 
 
 def _spoiled_fits(rig: Rig, residual_px: Mapping[str, Array]) -> Iterator[str]:

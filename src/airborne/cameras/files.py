@@ -22,7 +22,7 @@ from airborne.cameras.formats.xml import parse_xml
 from airborne.cameras.units import FARTHEST_M, check_baselines, longest_baseline_m
 from airborne.errors import CalibrationError
 from airborne.io.text import parse_toml, read_bytes, read_text
-from airborne.io.writing import write_text
+from airborne.io.writing import missing_folder, write_text
 from airborne.types import Size
 
 _LARGEST_FILE_BYTES = 2_000_000  # a hundred cameras take a tenth of it
@@ -141,7 +141,7 @@ def write_rig(
     if kind == "easymocap":
         path.mkdir(parents=True, exist_ok=True)
     if not path.parent.is_dir():
-        raise CalibrationError(f"{path}: there is no folder {path.parent}; make it, or give another path")
+        raise CalibrationError(missing_folder(path))
     for name, text in texts.items():
         write_text(path / name, text)  # path / "" is path itself
     return notes

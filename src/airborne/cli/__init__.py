@@ -27,6 +27,7 @@ from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
 from airborne.errors import STOPPED, UNDECIDED, AirborneError, UndecidedError
 from airborne.io.environment import set_up_libraries
+from airborne.io.writing import missing_folder
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _STEPS = {  # in the order of the work
@@ -137,7 +138,7 @@ def _describe_path_error(error: OSError) -> str:
         case IsADirectoryError():
             return f"{path} is a folder; give a file's name"
         case FileNotFoundError() if not path.parent.exists():
-            return f"{path}: there is no folder {path.parent}; make it, or give another path"
+            return missing_folder(path)
         case PermissionError() if path.suffix == ".part" or not path.exists():  # .part: a file that is being written
             return f"{path.parent} cannot be written ({error.strerror}); give another folder with -o"
     return f"{path}: {error.strerror or error}; give a path that can be read or written"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import filecmp
 import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,8 +10,9 @@ import typer
 
 from airborne.cli.console import Json, errors, sizes_px
 from airborne.errors import AirborneError, count
+from airborne.io.files import find_copies
 from airborne.io.terminal import Stages
-from airborne.io.writing import write_text
+from airborne.io.writing import missing_folder, write_text
 
 _TABLES = (".csv", ".tsv", ".txt")  # other files are videos
 
@@ -65,7 +65,7 @@ def calibrate_command(
     if output.exists() and output.suffix.lower() != ".toml":
         raise AirborneError(f"-o {output} exists and is no calibration (.toml); give the result another name")
     if not output.parent.is_dir():
-        raise AirborneError(f"-o {output}: there is no folder {output.parent}; make it, or give another path")
+        raise AirborneError(f"-o {missing_folder(output)}")
     if board is None and files[0].is_dir():
         raise AirborneError(f"{files[0]} is a folder; give a table or a file of sources, or --board for its images")
     if court is not None or wand is not None:
@@ -94,24 +94,16 @@ def calibrate_command(
 def _from_control_points(
     points: Path, size: str | None, output: Path, *, method: Literal["lm", "annealing"], as_json: bool
 ) -> None:
-    import numpy as np
-
     from airborne.calibration import calibrate as calibrate_cameras
     from airborne.calibration import read_control_points
-    from airborne.calibration.acceptance import write_accepted
+    from airborne.calibration.acceptance import Errors, write_accepted
     from airborne.calibration.points_report import describe_points_calibration, points_calibration_to_dict
 
     if size is None:
         raise AirborneError("--size is missing: give the image size in pixels, such as 768x576")
     table = read_control_points(points)
     calibration = calibrate_cameras(table, _sizes(size, table.cameras), method=method)
-    written, reasons = write_accepted(
-        output,
-        calibration.rig,
-        errors_px={fit.name: fit.rms_px for fit in calibration.fits},
-        held_out_px={fit.name: np.linalg.norm(fit.held_out_px, axis=1) for fit in calibration.fits},
-        residual_px={fit.name: fit.residual_px for fit in calibration.fits},
-    )
+    written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration))
     print(json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration))
     if not as_json:
         print(f"written: {written}")
@@ -150,11 +142,8 @@ def _wand_sources(videos: list[Path], length_m: float | None, size: str | None) 
 
 def _refuse_copies(videos: list[Path]) -> None:
     """Raise AirborneError where two cameras' videos have the same content."""
-    files = [path for path in videos if path.is_file()]
-    for k, path in enumerate(files):
-        for other in files[:k]:
-            if filecmp.cmp(path, other, shallow=False):
-                raise AirborneError(f"{other} and {path} are the same video; give each camera its own")
+    for first, second, *_ in find_copies(path for path in videos if path.is_file()):
+        raise AirborneError(f"{first} and {second} are the same video; give each camera its own")
 
 
 def _check_wand(length_m: float | None) -> None:
@@ -203,19 +192,14 @@ def _metres(text: str) -> float:
 
 def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> None:
     from airborne.calibration import calibrate_from
-    from airborne.calibration.acceptance import write_accepted
+    from airborne.calibration.acceptance import Errors, write_accepted
     from airborne.calibration.report import calibration_to_dict, describe_calibration
     from airborne.calibration.residual_figures import write_residual_figures
 
     with Stages() as stages:
         calibration = calibrate_from(sources, stages)
     report = calibration_to_dict(calibration)
-    written, reasons = write_accepted(
-        output,
-        calibration.rig,
-        errors_px={name: report["cameras"][name]["rms_px"] or 0.0 for name in calibration.rig.names},
-        held_out_px={name: calibration.held_out_px_of(name) for name in calibration.rig.names},
-    )
+    written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration))
     pictures = write_residual_figures(folder, calibration)
     write_text(folder / "report.json", json.dumps(report, indent=1))
     print(json.dumps(report) if as_json else describe_calibration(calibration))

@@ -29,6 +29,11 @@ def explain_full_disk(path: Path) -> Iterator[None]:
         ) from error
 
 
+def missing_folder(path: Path) -> str:
+    """Return the sentence that says that a path's folder is not there."""
+    return f"{path}: there is no folder {path.parent}; make it, or give another path"
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file."""
     with explain_full_disk(path):

@@ -16,6 +16,7 @@ from airborne.body.files import mesh_files
 from airborne.cameras.files import files_beside
 from airborne.errors import ResultError
 from airborne.export import write_json
+from airborne.io.files import file_digest
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
 from airborne.motion import drop_rows
 from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
@@ -252,17 +253,6 @@ def _further_files(trial: Trial) -> list[str]:
     meshes = [] if body is None else [str(Path(body).parent / name) for name in mesh_files(trial.path(body))]
     halves = [] if calibration is None else [path.name for path in files_beside(trial.path(calibration))]
     return meshes + [str(Path(calibration or "").parent / name) for name in halves]
-
-
-def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file; of a folder that of its JSON files."""
-    if path.is_dir():
-        digest = hashlib.sha256()
-        for file in sorted(path.rglob("*.json")):
-            digest.update(f"{file.relative_to(path).as_posix()} {file_digest(file)}\n".encode())
-        return digest.hexdigest()
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def list_tables(folder: Path) -> list[str]:

@@ -18,8 +18,8 @@ from airborne.body.surface import surface_arrays
 from airborne.cameras import Camera
 from airborne.cameras.finding import Finding, join_names
 from airborne.errors import MistakesError
+from airborne.io.files import find_copies
 from airborne.rendering import FLAT, render
-from airborne.run.folder import file_digest
 from airborne.trial.file import Trial
 from airborne.types import Mask
 from airborne.video import Recording, VideoFacts, VideoSource
@@ -34,18 +34,12 @@ _MOST_OF_IT = 0.5  # share of that agreement which a camera given the wrong imag
 
 
 def refuse_same_files(trial: Trial) -> None:
-    """Raise MistakesError where cameras' videos have the same content; only files of the same length are read."""
-    files = {camera.name: trial.path(camera.video) for camera in trial.camera if trial.path(camera.video).is_file()}
-    lengths = {name: path.stat().st_size for name, path in files.items()}
-    cameras_of: dict[str, list[str]] = {}
-    for name, path in files.items():
-        if list(lengths.values()).count(lengths[name]) > 1:
-            cameras_of.setdefault(file_digest(path), []).append(name)
+    """Raise MistakesError where cameras' videos have the same content."""
+    copies = find_copies(trial.path(camera.video) for camera in trial.camera if trial.path(camera.video).is_file())
     mistakes = [
-        f"cameras {join_names(names)} have the same video ({join_names([files[name].name for name in names])}); give "
-        "each camera its own"
-        for names in cameras_of.values()
-        if len(names) > 1
+        f"cameras {join_names([camera.name for camera in trial.camera if trial.path(camera.video) in group])} have the "
+        f"same video ({join_names([path.name for path in group])}); give each camera its own"
+        for group in copies
     ]
     if mistakes:
         raise MistakesError(trial.name, mistakes)

@@ -27,6 +27,7 @@ from airborne.cameras.detections import landmarks_from_points
 from airborne.errors import BodyError, TrialError
 from airborne.export.pictures import encode_png
 from airborne.export.views import crop_camera, resample_view
+from airborne.io.writing import missing_folder
 from airborne.rendering import FLAT, render
 from airborne.run.body_clicks import Clicks
 from airborne.run.detections import landmarks_over_time
@@ -73,7 +74,7 @@ def fit_person(
     if n_frames < 1:
         raise TrialError(f"frames is {n_frames}; expected at least 1 frame to fit the body to")
     if not output.absolute().parent.is_dir():
-        raise TrialError(f"{output}: there is no folder {output.parent}; make it, or give another path")
+        raise TrialError(missing_folder(output))
     if skeleton is not None:
         if trial.start.detections is None:
             raise TrialError(f"{trial.name}: skeleton goes with detections under [start]; the trial has none")
