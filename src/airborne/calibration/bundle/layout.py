@@ -41,7 +41,7 @@ class Pattern:
     def matrix(self, blocks: list[Array]) -> csc_array:
         """Return the sum of blocks (b, q, q), in the order in which they were given."""
         n, values = len(self.diagonal), np.concatenate([np.zeros(0), *(block.ravel() for block in blocks)])
-        data = np.bincount(self.blocks, values, minlength=len(self.indices) + 1)[: len(self.indices)]
+        data = _sum_at(self.blocks, values, len(self.indices))
         return csc_array((data, self.indices, self.indptr), shape=(n, n))
 
 
@@ -112,16 +112,17 @@ class Layout:
     def couple(self, groups: Array) -> Array:
         """Return the sum (camera columns, other columns) of blocks (g, p, q)."""
         c, o = self.n_camera_columns, self.n_other_columns
-        return np.bincount(self.coupling.ravel(), groups.ravel(), minlength=c * o + 1)[: c * o].reshape(c, o)
+        return _sum_at(self.coupling, groups, c * o).reshape(c, o)
 
     def sum_cameras(self, values: Array) -> Array:
         """Return the sums (camera columns,) of values (n, p) by the cameras' parameters."""
-        return _sum_at(self.cameras[self.camera_of_group], self.sum_groups(values), self.n_camera_columns)
+        n = self.n_camera_columns  # where -1 goes, nowhere
+        return _sum_at(self.cameras[self.camera_of_group] % (n + 1), self.sum_groups(values), n)
 
     def sum_others(self, values: Array, ends: Array, lags: Array) -> Array:
         """Return the sums (other columns,) of values (n, q), of lengths' (k, 6) and of lags' (l,)."""
-        columns = np.concatenate([each.ravel() for each in (self.other, self.ends, self.lags)])
-        return _sum_at(columns, np.concatenate([values.ravel(), ends.ravel(), lags]), self.n_other_columns)
+        n, columns = self.n_other_columns, np.concatenate([each.ravel() for each in (self.other, self.ends, self.lags)])
+        return _sum_at(columns % (n + 1), np.concatenate([values.ravel(), ends.ravel(), lags]), n)
 
 
 def number_parameters(rig: Rig, free_parameters: Mapping[str, FreeParameters]) -> Ints:
@@ -162,5 +163,5 @@ def _pairs(left: Ints, right: Ints, n: int, n_left: int | None = None) -> Ints:
 
 
 def _sum_at(places: Ints, values: Array, n: int) -> Array:
-    """Return the sums (n,) of values at places, -1 nowhere."""
-    return np.bincount(places.ravel() + 1, values.ravel(), minlength=n + 1)[1:]
+    """Return the sums (n,) of values at places; n: nowhere."""
+    return np.asarray(np.bincount(places.ravel(), values.ravel(), minlength=n + 1)[:n], float)
