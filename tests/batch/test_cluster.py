@@ -167,6 +167,13 @@ def check_batches(season, scheduler, tmp_path, capsys):
     assert "good: leave alone" in capsys.readouterr().out
 
 
+def test_a_dry_run_names_a_video_that_is_missing(season, tmp_path, capsys):
+    shutil.copytree(season / "good", tmp_path / "trials" / "good")
+    (tmp_path / "trials" / "good" / "cam2.mp4").unlink()
+    assert in_process("batch", tmp_path / "trials", "-o", tmp_path / "out", "--dry-run") == 0
+    assert re.match(r"good: cannot be tracked: .*cam2\.mp4", capsys.readouterr().out)
+
+
 @pytest.mark.usefixtures("impatient")
 def test_a_batch_that_cannot_start_exits_with_2(tmp_path, season, capsys):
     assert in_process("batch", tmp_path / "nothing", "-o", tmp_path / "out") == 2

@@ -59,6 +59,11 @@ def test_stamps_of_other_cameras_and_of_images_that_are_missing_are_said(recordi
     write_stamps(recording / "others.csv", (7, 8, 9))
     with pytest.raises(CalibrationError, match="no rows of camera 'cam0'; its cam_id are:"):
         read_inputs(sources(recording, timestamps="others.csv"), silent)
+    write_stamps(recording / "half.csv", (0, 1, 2), skip={(k, camera) for k in range(0, 99, 2) for camera in range(3)})
+    with pytest.raises(
+        CalibrationError, match=r"rows of camera 'cam0', whose recording has \d+ images; give the table"
+    ):
+        read_inputs(sources(recording, timestamps="half.csv"), silent)
     write_stamps(recording / "gap.csv", (0, 1, 2), skip={(k, 1) for k in (10, 11, 12)})
     detections = read_inputs(sources(recording, timestamps="gap.csv"), silent).board_detections
     assert [(finding.kind, finding.cameras) for finding in detections.findings] == [("clock", ("cam1",))]

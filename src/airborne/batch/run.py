@@ -14,6 +14,7 @@ from airborne.batch.trials import BatchTrial
 from airborne.errors import AirborneError, ResultError
 from airborne.io.folder_lock import sole_writer
 from airborne.trial.file import read_trial
+from airborne.video import VideoSource, inspect
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,12 @@ def describe_plan(tasks: Sequence[Task]) -> list[str]:
     lines = []
     for task in tasks:
         try:
-            lines.append(f"{task.trial.name}: {words[inspect_folder(task, read_trial(task.trial.path))[0]]}")
+            trial = read_trial(task.trial.path)
+            status = inspect_folder(task, trial)[0]
+            if status != "unchanged":
+                for camera in trial.camera:
+                    inspect(VideoSource(camera.name, trial.path(camera.video)))  # raises where it cannot be opened
+            lines.append(f"{task.trial.name}: {words[status]}")
         except AirborneError as error:
             lines.append(f"{task.trial.name}: cannot be tracked: {error}")
     return lines
