@@ -142,7 +142,7 @@ def _wand_sources(videos: list[Path], length_m: float | None, size: str | None) 
 
 def _refuse_copies(videos: list[Path]) -> None:
     """Raise AirborneError where two cameras' videos have the same content."""
-    for first, second, *_ in find_copies(path for path in videos if path.is_file()):
+    for first, second, *_ in find_copies([path for path in videos if path.is_file()]):
         raise AirborneError(f"{first} and {second} are the same video; give each camera its own")
 
 

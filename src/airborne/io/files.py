@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -18,7 +18,7 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def find_copies(paths: Iterable[Path]) -> list[list[Path]]:
+def find_copies(paths: Sequence[Path]) -> list[list[Path]]:
     """Return the groups of files with the same content; only files of the same length are read."""
     by_length: dict[int, list[Path]] = {}
     for path in paths:

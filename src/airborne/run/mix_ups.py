@@ -35,7 +35,7 @@ _MOST_OF_IT = 0.5  # share of that agreement which a camera given the wrong imag
 
 def refuse_same_files(trial: Trial) -> None:
     """Raise MistakesError where cameras' videos have the same content."""
-    copies = find_copies(trial.path(camera.video) for camera in trial.camera if trial.path(camera.video).is_file())
+    copies = find_copies([trial.path(camera.video) for camera in trial.camera if trial.path(camera.video).is_file()])
     mistakes = [
         f"cameras {join_names([camera.name for camera in trial.camera if trial.path(camera.video) in group])} have the "
         f"same video ({join_names([path.name for path in group])}); give each camera its own"

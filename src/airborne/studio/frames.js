@@ -5,11 +5,11 @@ export default {
   template: `<div class="frames">
     <button type="button" :aria-label="playing ? 'stop' : 'play'" @click="toggle">{{ playing ? "❚❚" : "▶" }}</button>
     <input type="range" min="0" :max="n_frames - 1" :value="frame" aria-label="all frames" @input="go($event.target.value)" @keydown="leave">
-    <input type="number" min="0" :max="n_frames - 1" :value="frame" aria-label="frame in view" @change="go($event.target.value)" @keydown="leave">
+    <input type="number" min="0" :max="n_frames - 1" :value="typed ?? frame" aria-label="frame in view" @input="typed = $event.target.value" @change="goToTyped" @blur="typed = null" @keydown="leave">
     <span>(0 to {{ n_frames - 1 }}){{ time_s === null ? "" : ", " + time_s.toFixed(3) + " s" }}</span>
   </div>`,
   props: { view: Number, n_frames: Number, start: Number },
-  data() { return { frame: this.start, time_s: null, playing: false }; },
+  data() { return { frame: this.start, time_s: null, playing: false, typed: null }; }, // pictures come while one types
   mounted() {
     this.onShown = ({ detail }) => detail.from === getElement(this.view) && this.show(detail);
     this.onPlay = ({ detail }) => detail.from === getElement(this.view) && this.toggle();
@@ -23,6 +23,10 @@ export default {
   },
   methods: {
     go(frame) { getElement(this.view).go(Number(frame)); },
+    goToTyped() {
+      if (this.typed) this.go(this.typed);
+      this.typed = null;
+    },
     show({ frame, time_s }) {
       const period = this.time_s === null || time_s === null ? LONGEST_MS / 4 : Math.min(LONGEST_MS, 1000 * Math.abs(time_s - this.time_s));
       [this.frame, this.time_s] = [frame, time_s];
