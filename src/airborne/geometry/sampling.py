@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,11 +23,14 @@ def latin_hypercube(dimensions: int, n: int, *, seed: int) -> Array:
     return (strata + rng.random((n, dimensions))) / n
 
 
+@cache
 def sobol_points(dimensions: int, n: int, *, seed: int) -> Array:
     """Return n points (n, dimensions) of a scrambled Sobol sequence, even in many coordinates together, as limbs need.
 
-    Of a limb's nine coordinates a Latin hypercube missed poses that this finds.
+    Of a limb's nine coordinates a Latin hypercube missed poses that this finds. The array is made once and read-only.
     """
     from scipy.stats import qmc
 
-    return qmc.Sobol(dimensions, rng=seed).random(n)
+    points = qmc.Sobol(dimensions, rng=seed).random(n)
+    points.flags.writeable = False
+    return points

@@ -16,7 +16,7 @@ def propagate_variances(jacobian: Array, covariance: Array) -> Array:
     that depend on an unknown one are NaN.
     """
     if np.isfinite(covariance).all():
-        variance = np.einsum("...i,ij,...j->...", jacobian, covariance, jacobian, optimize=True)
+        variance = np.sum(jacobian @ covariance * jacobian, axis=-1)
     else:
         variance = _propagate_with_unknowns(np.where(np.abs(jacobian) < _NEGLIGIBLE, 0.0, jacobian), covariance)
     return np.where(variance >= 0, variance, np.nan)
@@ -25,7 +25,7 @@ def propagate_variances(jacobian: Array, covariance: Array) -> Array:
 def _propagate_with_unknowns(jacobian: Array, covariance: Array) -> Array:
     is_finite = np.isfinite(covariance).all(axis=0)
     finite, other = jacobian[..., is_finite], jacobian[..., ~is_finite]
-    variance = np.einsum("...i,ij,...j->...", finite, covariance[np.ix_(is_finite, is_finite)], finite, optimize=True)
+    variance = np.sum(finite @ covariance[np.ix_(is_finite, is_finite)] * finite, axis=-1)
     with np.errstate(invalid="ignore"):
         for a, b, block in (
             (other, other, covariance[np.ix_(~is_finite, ~is_finite)]),
