@@ -30,7 +30,7 @@ _IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 _LARGEST_PICTURE_BYTES = 200_000_000  # larger files are no pictures
 _LARGEST_TABLE_BYTES = 50_000_000  # of time stamps; larger files are refused
 _N_SAMPLES = 12  # images of a camera that test how the board was printed
-_OTHER_RECORDING = 0.1  # share of the images by which a table of time stamps differs that belongs to another recording
+_OTHER_RECORDING = 0.25  # share of the images by which a table of another recording differs: so many are never lost
 _ODD_PICTURES = 2  # a larger difference to the other cameras is reported
 
 
@@ -133,7 +133,10 @@ def match_moments(
 ) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
     """Return by camera the moment of each of its frames, the moments' times, and what is wrong with them."""
     if sources.board is not None and sources.board.timestamps is not None:
-        return _moments_by_time_stamps(sources.path(sources.board.timestamps), sources, cameras)
+        path = sources.path(sources.board.timestamps)
+        stamped = _moments_by_time_stamps(path, cameras)
+        _refuse_other_recording(path, sources, cameras, [len(frames) for frames in stamped[0]])
+        return stamped
     facts = [inspect(VideoSource(c.name, sources.path(c.video or ""))) for c in cameras]
     rate = float(facts[0].frame_rate)
     ends = [float(f.duration_s) + c.offset_s for f, c in zip(facts, cameras, strict=True) if f.duration_s]
@@ -154,7 +157,7 @@ def match_moments(
 
 
 def _moments_by_time_stamps(
-    path: Path, sources: Sources, cameras: Sequence[CameraSource]
+    path: Path, cameras: Sequence[CameraSource]
 ) -> tuple[list[dict[int, int]], Array, tuple[Finding, ...]]:
     """Read a table sync_index,cam_id,frame_time: the n-th row of a camera, by time, is its video's n-th frame."""
     expected = "expected the columns sync_index,cam_id,frame_time"
@@ -181,14 +184,21 @@ def _moments_by_time_stamps(
         stamps = sorted((r for r in table if r["cam_id"].strip() == key), key=lambda r: int(r["sync_index"]))
         findings += check_time_stamps(camera.name, stamps)
         own = sorted((row for row in rows if row[1] == key), key=lambda row: row[2])
-        n = _n_images(sources, camera) or len(own)
-        if abs(len(own) - n) > max(_ODD_PICTURES, _OTHER_RECORDING * n):
-            raise CalibrationError(
-                f"{path} has {len(own)} rows of camera '{camera.name}', whose recording has {n} images; give the table "
-                "that was written with this recording"
-            )
         moments.append({n: moment[row[0]] for n, row in enumerate(own)})
     return moments, time_s - time_s[0], tuple(findings)
+
+
+def _refuse_other_recording(
+    path: Path, sources: Sources, cameras: Sequence[CameraSource], n_stamps: Sequence[int]
+) -> None:
+    """Raise CalibrationError where a table has far more or fewer time stamps than a camera has images."""
+    for camera, n in zip(cameras, n_stamps, strict=True):
+        n_images = _n_images(sources, camera) or n
+        if abs(n - n_images) > max(_ODD_PICTURES, _OTHER_RECORDING * n_images):
+            raise CalibrationError(
+                f"{path} has {n} rows of camera '{camera.name}', whose recording has {n_images} images; give the table "
+                "that was written with this recording"
+            )
 
 
 def _stamp_id(name: str, ids: set[str]) -> str | None:
