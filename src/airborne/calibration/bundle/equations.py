@@ -109,9 +109,7 @@ def jacobian_of(problem: Problem, state: State) -> Jacobian:
     _, by_camera, by_world = project_with_jacobian(
         state.R[i], state.centre[i], state.intrinsics[i], is_fisheye=problem.is_fisheye[i], world=world
     )
-    columns = problem.camera_columns
-    is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
-    ratio = np.where(is_square, state.intrinsics[:, 1] / state.intrinsics[:, 0], 0.0)
+    ratio = np.where(problem.is_square, state.intrinsics[:, 1] / state.intrinsics[:, 0], 0.0)
     by_camera[:, :, 6] += by_camera[:, :, 7] * ratio[i, None]
     by_other = np.zeros((len(i), 2, 7))
     by_other[:, :, :3] = by_world

@@ -26,16 +26,14 @@ class Pattern:
     @classmethod
     def of(cls, n: int, blocks: list[Ints]) -> Pattern:
         """Find the places of the pairs of columns of each block (b, q), -1 nowhere, of a matrix (n, n)."""
-        keys = [_pairs(columns, columns, n).ravel() for columns in blocks]
-        keys = np.concatenate([*keys, np.arange(n) * (n + 1)])
-        places, place = np.unique(keys, return_inverse=True)
-        is_nowhere = len(places) > 0 and places[-1] == n * n
-        places = places[: len(places) - is_nowhere]
+        keys = [_pairs(columns, columns, (n, n)).ravel() for columns in blocks]
+        places, place = np.unique(np.concatenate([*keys, np.arange(n) * (n + 1), [n * n]]), return_inverse=True)
+        places, n_entries = places[:-1], len(place) - n - 1  # the last is nowhere
         return cls(
             indices=places % max(n, 1),
             indptr=np.searchsorted(places, np.arange(n + 1) * n),
-            diagonal=place[len(place) - n :],
-            blocks=place[: len(place) - n],
+            diagonal=place[n_entries:-1],
+            blocks=place[:n_entries],
         )
 
     def matrix(self, blocks: list[Array]) -> csc_array:
@@ -95,7 +93,7 @@ class Layout:
             starts=starts,
             camera_starts=np.searchsorted(camera[order], np.arange(len(cameras) + 1)),
             camera_of_group=camera_of_group,
-            coupling=_pairs(cameras[camera_of_group], other_of_group, n_others, n_camera_columns),
+            coupling=_pairs(cameras[camera_of_group], other_of_group, (n_camera_columns, n_others)),
             lags=lags,
             others=Pattern.of(n_others, [other_of_group, ends, lags[:, None]]),
         )
@@ -156,10 +154,13 @@ def columns_of_rows(moment: Ints, point: Ints, lag: Ints, *, of_target: Ints, of
     return columns
 
 
-def _pairs(left: Ints, right: Ints, n: int, n_left: int | None = None) -> Ints:
-    """Return the places (b, p, q), left n + right, of all pairs of columns (b, p) and (b, q); past the end: nowhere."""
+def _pairs(left: Ints, right: Ints, shape: tuple[int, int]) -> Ints:
+    """Return the places (b, p, q) in a flat matrix of all pairs of a row (b, p) and a column (b, q).
+
+    -1 in either: past the end, nowhere.
+    """
     left, right = left[:, :, None], right[:, None, :]
-    return np.where((left < 0) | (right < 0), (n if n_left is None else n_left) * n, left * n + right)
+    return np.where((left < 0) | (right < 0), shape[0] * shape[1], left * shape[1] + right)
 
 
 def _sum_at(places: Ints, values: Array, n: int) -> Array:

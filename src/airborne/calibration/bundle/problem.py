@@ -56,7 +56,6 @@ class Problem:
     length_sd_m: Array  # (k,)
     length_source: Ints  # (k,)
     lag: Ints  # (n,) rows of lags, -1: none
-    lag_columns: Ints  # (l,)
     lag_sd_s: Array  # (l,)
     lag_source: Ints  # (l,)
     time_s: Array  # (m,) of each moment; NaN without lags [s]
@@ -64,7 +63,13 @@ class Problem:
     @property
     def n_camera_columns(self) -> int:
         """How many camera parameters are free."""
-        return int(self.camera_columns.max(initial=-1)) + 1
+        return self.layout.n_camera_columns
+
+    @property
+    def is_square(self) -> NDArray[np.bool_]:
+        """Which cameras' focal lengths share a column, so that their ratio stays: (cameras,)."""
+        fx, fy = self.camera_columns[:, 6:8].T
+        return (fx >= 0) & (fx == fy)
 
     @property
     def n_other_columns(self) -> int:
@@ -122,7 +127,6 @@ def build_problem(rig: Rig, sources: Sequence[Source], free_parameters: Mapping[
         length_m=np.concatenate([np.zeros(0), *(x.length_m for _, x, _ in lengths)]),
         length_sd_m=np.concatenate([np.zeros(0), *(np.broadcast_to(x.sd_m, len(x.first)) for _, x, _ in lengths)]),
         lag=lag,
-        lag_columns=lag_columns,
         lag_sd_s=lag_sd_s,
         lag_source=lag_source,
         time_s=np.concatenate([np.zeros(0), *(_times(s) for s in sources)]),
@@ -176,11 +180,11 @@ def apply_step(problem: Problem, state: State, step: Array, other_step: Array) -
         state,
         R=Rotation.from_rotvec(change[:, :3]).as_matrix() @ state.R,
         centre=state.centre + change[:, 3:6],
-        intrinsics=state.intrinsics + _keep_focal_ratio(state, change[:, 6:], problem.camera_columns),
+        intrinsics=state.intrinsics + _keep_focal_ratio(state, change[:, 6:], problem.is_square),
         target_R=Rotation.from_rotvec(target[:, :3]).as_matrix() @ state.target_R if len(target) else state.target_R,
         target_t=state.target_t + target[:, 3:],
         points=state.points + point,
-        lags=state.lags + _step_of(other_step, problem.lag_columns),
+        lags=state.lags + _step_of(other_step, problem.layout.lags),
     )
 
 
@@ -223,9 +227,8 @@ def _step_of(step: Array, columns: Ints) -> Array:
     return np.append(step, 0.0)[columns]
 
 
-def _keep_focal_ratio(state: State, change: Array, columns: Ints) -> Array:
+def _keep_focal_ratio(state: State, change: Array, is_square: NDArray[np.bool_]) -> Array:
     """Preserve the ratio of the focal lengths where they share a column; change (cameras, 12)."""
-    is_square = (columns[:, 6] >= 0) & (columns[:, 6] == columns[:, 7])
     ratio = state.intrinsics[:, 1] / state.intrinsics[:, 0]
     change = change.copy()
     change[:, 1] = np.where(is_square, change[:, 0] * ratio, change[:, 1])
