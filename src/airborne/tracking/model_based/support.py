@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, PosedBody
+from airborne.body.chain import delta_between, move_pose
 from airborne.tracking.model_based.absent_segments import absence_costs_in_fitted_light, absence_costs_in_known_light
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.gauss_newton import ImageView
@@ -16,6 +17,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
 _STRONG_NATS = 3.0  # a view shows a segment where it is 20 times likelier with it: "strong" (Kass & Raftery 1995)
+_OBSERVED_SD_RAD, _UNOBSERVED_VARIANCE = 0.1, 1e6  # a rotation with a larger sd than this is hardly extrapolated
 _ONE_VIEW_SD_M = 0.1  # of the far end of a segment that one view alone shows
 
 
@@ -54,6 +56,20 @@ def widen_unseen(covariance: Array, model: BodyModel, n_views: NDArray[np.intege
         else:
             covariance = mark_unobserved(covariance, np.arange(own.start, own.stop))
     return covariance
+
+
+def shrink_unobserved(last: Pose, predicted: Pose, covariance: Array) -> Pose:
+    """Shrink the predicted rotations of root and joints by how well they were observed: unobserved ones stay.
+
+    A joint's rotation vector with covariance C is multiplied by S (S + C)^-1, S = _OBSERVED_SD_RAD^2.
+    """
+    delta = delta_between(last, predicted)
+    rotations = delta[3:].reshape(-1, 3)
+    first = 3 + 3 * np.arange(len(rotations))[:, None] + np.arange(3)
+    C = np.nan_to_num(covariance[first[:, :, None], first[:, None, :]], posinf=_UNOBSERVED_VARIANCE)
+    S = _OBSERVED_SD_RAD**2 * np.eye(3)
+    delta[3:] = (S @ np.linalg.solve(S + C, rotations[..., None]))[..., 0].ravel()
+    return move_pose(last, delta)
 
 
 def mark_unobserved(covariance: Array, columns: NDArray[np.integer]) -> Array:
