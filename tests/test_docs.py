@@ -24,7 +24,7 @@ from airborne.evaluation.players import PartErrors
 from airborne.export.figures import write_figures
 from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
-from airborne.motion.run_folder import SMOOTH_RECORD, figures_of
+from airborne.motion.run_folder import SMOOTH_JOINTS, SMOOTH_RECORD, figures_of
 from airborne.run import smooth
 from airborne.run.body import write_tables
 from airborne.run.evaluate import assess
@@ -259,7 +259,7 @@ def test_every_file_of_a_smoothed_run_is_documented():
     documented = {name for row in table_of(RESULTS, "Files added to a finished run") for name in named(row[0])}
     assert {
         smooth.MOTION,
-        smooth.JOINTS,
+        SMOOTH_JOINTS,
         smooth.ANGLES,
         smooth.EVENTS,
         smooth.RESIDUALS_FIGURE,

@@ -50,6 +50,26 @@ def test_a_shift_of_the_world_is_the_bias_and_goes_with_it():
     assert result.whole.mean_without_offset_mm > 0.1  # the segments turn under it
 
 
+def test_smoothed_joints_take_the_places_of_the_tracked_ones_and_their_deviations():
+    off_m = np.array([0.003, 0.0, -0.004])
+    smooth = paths(names=MARKS, error_m=off_m)
+    smooth = replace(smooth, sd=np.full(smooth.points.shape[:2], 1e-4))
+    result = compare_joints(run(), MODEL, paths(), smooth)
+    np.testing.assert_allclose(result.whole.bias_mm, 1e3 * off_m, atol=1e3 * ROUNDTRIP)
+    assert result.calibration.within_2sd == pytest.approx(1 / 3)  # the one axis without an error
+    reordered = replace(
+        smooth, names=MARKS[::-1], points=smooth.points[:, ::-1], sd=np.full(smooth.points.shape[:2], np.inf)
+    )
+    assert compare_joints(run(), MODEL, paths(), reordered).whole == result.whole
+    assert "single frames" not in result.describe()
+
+
+@pytest.mark.parametrize("other", [{"names": ("a", *MARKS[1:])}, {"time_s": TIMES + 1}, {"time_s": TIMES[:-1]}])
+def test_smoothed_joints_of_another_run_are_refused(other):
+    with pytest.raises(ResultError, match="smoothed joints are of another run"):
+        compare_joints(run(), MODEL, paths(), replace(paths(), **other))
+
+
 def test_another_definition_of_a_joint_is_an_offset_in_its_segment_and_goes_with_it():
     offset = np.array([0.02, -0.01, 0.005])
     other = replace(
@@ -196,7 +216,14 @@ def test_joints_of_a_run_are_read_back_as_paths(tmp_path):
     result = read_joint_paths(tmp_path / "joints.csv")
     assert result.names == MARKS
     np.testing.assert_array_equal(result.time_s, TIMES)
-    np.testing.assert_array_equal(result.points, landmarks(run(lost=[2]), MODEL)[0])
+    points, sd = landmarks(run(lost=[2]), MODEL)
+    np.testing.assert_array_equal(result.points, points)
+    np.testing.assert_array_equal(result.sd, sd)
+
+
+def test_an_infinite_deviation_is_read_as_it_is_written(tmp_path):
+    write_joints(tmp_path / "joints.csv", run(covariance=np.diag(np.full(MODEL.n_dofs, np.inf))), MODEL)
+    assert np.isinf(read_joint_paths(tmp_path / "joints.csv").sd).all()
 
 
 TRC = (

@@ -146,3 +146,14 @@ def test_two_frames_are_too_few_and_nothing_is_written(run, capsys):
     before = files_of(run)
     assert "no stretch has 5 frames with a pose (the run has 2 frames)" in refusal(capsys, "smooth", run, "--kalman")
     assert files_of(run) == before
+
+
+def test_smoothed_joints_are_compared_beside_those_that_were_tracked(run, capsys):
+    assert in_process("smooth", run, "--kalman", "--events", "none") == 0
+    reference = shutil.copyfile(run / "tables/smooth_joints.csv", run.parent / "reference.csv")
+    assert in_process("evaluate", run, "--joints", reference, "--json") == 0
+    compared = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert compared["smooth_joints"]["whole"]["largest_mm"] == 0
+    assert 0 < compared["joints"]["whole"]["mean_mm"] < 2
+    assert in_process("evaluate", run, "--joints", reference) == 0
+    assert "the smoothed joints against them" in capsys.readouterr().out

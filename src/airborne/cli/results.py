@@ -14,6 +14,7 @@ _AGAINST = {
     "truth": "against the truth",
     "digitised": "against points clicked by hand",
     "joints": "against the paths of the joints",
+    "smooth_joints": "the smoothed joints against them",
 }
 
 

@@ -26,11 +26,12 @@ _SINGLE |= {"hip": "pelvis", "midhip": "pelvis", "chip": "pelvis"}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointPaths:
-    """Positions of joints over time, from another system or true."""
+    """Positions of joints over time: from another system, true, or smoothed."""
 
     names: tuple[str, ...]  # as in the file
     time_s: Array  # (n,) increasing [s]
     points: Array  # (n, joints, 3) world [m]; NaN where not known
+    sd: Array | None = None  # (n, joints) [m], root mean square over the axes; None where the file has none
 
 
 def read_joint_paths(path: Path) -> JointPaths:
@@ -71,7 +72,11 @@ def _read_long(path: Path) -> JointPaths:
         raise ResultError(f"{path} has {names[who]} {count.max()} times at {time_s[when]:g} s; give each joint once")
     points = np.full((len(time_s), len(names), 3), np.nan)
     points[at, joint] = positions
-    return JointPaths(names=names, time_s=time_s, points=points)
+    sd = None
+    if "sd_m" in table.names:
+        sd = np.full(points.shape[:2], np.nan)
+        sd[at, joint] = table.numbers(["sd_m"], or_infinite=True)[:, 0]
+    return JointPaths(names=names, time_s=time_s, points=points, sd=sd)
 
 
 def _read_trc(path: Path) -> JointPaths:

@@ -102,6 +102,7 @@ class JointComparison:
         if self.coverage.n:
             lines.append(self.coverage_with_offset.describe("errors"))
             lines.append(self.coverage.describe("errors without offset"))
+        if self.coverage_by_frame.n:
             by_frame = self.coverage_by_frame.describe("errors without offset")
             lines.append(f"by the deviations of single frames, without lasting ones: {by_frame}")
         lines.append(f"joints tracked: {self.share_tracked:.0%}; of these more than 100 mm off: {self.n_far}")
@@ -123,11 +124,14 @@ class _Pairs:
         return self.measured - self.reference
 
 
-def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> JointComparison:
+def compare_joints(
+    motion: Motion, model: BodyModel, reference: JointPaths, smooth: JointPaths | None = None
+) -> JointComparison:
     """Compare a motion's landmarks with a reference, frame by frame, matched as in `compare_motion`.
 
-    A marker is matched with the landmark of its name, or else that of `landmark_of`. Raises ResultError if no marker
-    has a landmark, or no frame with a pose has a reference.
+    A marker is matched with the landmark of its name, or else that of `landmark_of`. With `smooth`, the motion's
+    landmarks as they were smoothed take the places of its own, and their deviations. Raises
+    ResultError if no marker has a landmark, no frame with a pose has a reference, or `smooth` is not of the motion.
     """
     marker_columns, not_compared = _match_markers(model, reference)
     columns = [k for k, mark in enumerate(model.landmarks) if mark.name in marker_columns]
@@ -144,10 +148,13 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
     points, all_sd = landmarks(motion, model)
     joint_status = joint_statuses(motion, model, all_sd)[:, columns]
     measured, sd = points[:, columns], all_sd[:, columns]
+    sd_by_frame = landmarks(replace(motion, lasting=None), model)[1][:, columns]
+    if smooth is not None:
+        measured, sd = _smoothed(motion, smooth, names)
+        sd_by_frame = np.full(sd.shape, np.nan)  # they are not told apart
     R = _rotations(motion, model, columns)
     frames, rows = frames[has_pose], rows[has_pose]
     pairs = _Pairs(measured[frames], reference.points[rows], R[frames])
-    sd_by_frame = landmarks(replace(motion, lasting=None), model)[1][:, columns]
     is_known = np.asarray(np.isfinite(pairs.error).all(axis=-1))
     if not is_known.any():
         raise ResultError("the reference has no number where the motion has a pose; give the joints of this recording")
@@ -180,6 +187,15 @@ def compare_joints(motion: Motion, model: BodyModel, reference: JointPaths) -> J
         better_shift_s=shift_s,
         better_mean_without_offset_mm=shifted_mm,
     )
+
+
+def _smoothed(motion: Motion, smooth: JointPaths, names: list[str]) -> tuple[Array, Array]:
+    """Return the smoothed landmarks of these names in the motion's frames, and their sds: (n, l, 3), (n, l) [m]."""
+    if len(smooth.time_s) != len(motion) or np.any(smooth.time_s != motion.time_s) or not set(names) <= {*smooth.names}:
+        raise ResultError("the smoothed joints are of another run; `airborne smooth` this one again")
+    columns = [smooth.names.index(name) for name in names]
+    sd = np.full((len(motion), len(names)), np.nan) if smooth.sd is None else smooth.sd[:, columns]
+    return smooth.points[:, columns], sd
 
 
 def _match_markers(model: BodyModel, reference: JointPaths) -> tuple[dict[str, int], list[str]]:

@@ -23,8 +23,11 @@ class Table:
     lines: list[list[str]]
     line_numbers: list[int]
 
-    def numbers(self, names: list[str]) -> NDArray[np.float64]:
-        """Return the named columns as numbers (lines, names), blank cells as NaN; ResultError for anything else."""
+    def numbers(self, names: list[str], *, or_infinite: bool = False) -> NDArray[np.float64]:
+        """Return the named columns as numbers (lines, names), blank cells as NaN; ResultError for anything else.
+
+        Where cells may be infinite, as standard deviations are, that is written `inf`.
+        """
         columns = [self.names.index(name) for name in names]
         values = np.full((len(self.lines), len(names)), np.nan)
         for row, cells in enumerate(self.lines):
@@ -33,6 +36,9 @@ class Table:
                 raise ResultError(f"{where} has {len(cells)} cells, expected {len(self.names)}; correct it")
             for k, (name, column) in enumerate(zip(names, columns, strict=True)):
                 text = cells[column].strip()
+                if or_infinite and text == "inf":
+                    values[row, k] = np.inf
+                    continue
                 try:
                     values[row, k] = float(text) if text else np.nan
                 except ValueError:

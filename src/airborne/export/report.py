@@ -112,8 +112,8 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     - `events`: sentences on what happened to the recording
     - `method`, `timings_s` [s], `versions`, `inputs` (SHA-256 by file name): dictionaries of names and values
     - `cameras`: one dictionary for each camera, with `name` first
-    - `truth`: `MotionComparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints`:
-      `JointComparison.to_dict()`
+    - `truth`: `MotionComparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints` and
+      `smooth_joints`: `JointComparison.to_dict()`
     - `self_check`: what the pictures say against the files, see `Finding.to_dict`
     - `flight`: `FlightSummary.to_dict()`
 
@@ -179,8 +179,9 @@ def _comparisons(summary: Mapping[str, Any]) -> Iterator[_Comparison]:
     for key, title in (("truth", "Compared with the truth"), ("digitised", "Compared with points digitised by hand")):
         if summary.get(key):
             yield _pose_comparison(title, summary[key])
-    if summary.get("joints"):
-        yield _joint_comparison("Compared with the paths of the joints", summary["joints"])
+    for key, title in (("joints", "Compared with the paths of the joints"), ("smooth_joints", "The same, smoothed")):
+        if summary.get(key):
+            yield _joint_comparison(title, summary[key])
 
 
 def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:

@@ -58,8 +58,8 @@ _LARGEST_METHODS_BYTES = 1_000_000  # a hundred comparisons; anything larger was
 def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None) -> Comparisons:
     """Compare the run in a folder, and put the comparison into its summary; of one body into figures and report too.
 
-    `joints` are paths of joints as `read_joint_paths` reads them. Raises ResultError where the folder holds no finished
-    run or a file cannot be read.
+    `joints` are paths of joints as `read_joint_paths` reads them, with which smoothed joints in the folder are compared
+    too. Raises ResultError where the folder holds no finished run or a file cannot be read.
     """
     if holds_players(folder):
         return _assess_players(folder, truth, is_alone=digitised is None and joints is None)
@@ -79,7 +79,10 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         clicked = fit_digitised_poses(read_digitised(digitised, rig), rig, model)
         comparisons["digitised"] = compare_digitised(motion, clicked, symmetry)
     if joints is not None:
-        comparisons["joints"] = compare_joints(motion, model, read_joint_paths(joints))
+        paths, smooth = read_joint_paths(joints), folder / run_folder.SMOOTH_JOINTS
+        comparisons["joints"] = compare_joints(motion, model, paths)
+        if smooth.is_file():
+            comparisons["smooth_joints"] = compare_joints(motion, model, paths, read_joint_paths(smooth))
     with open_results(folder):
         summary = _add_to_summary(folder, comparisons)
         if summary and (folder / run_folder.REPORT).is_file():

@@ -17,6 +17,7 @@ from airborne.export.analysis_figures import write_residuals
 from airborne.motion import landmarks
 from airborne.motion.flight.phases import Event, body_events, player_events
 from airborne.motion.run_folder import (
+    SMOOTH_JOINTS,
     SMOOTH_RECORD,
     figures_of,
     holds_players,
@@ -46,7 +47,7 @@ from airborne.types import Array, Progress
 
 Events = dict[str, tuple[Event, ...]]  # by player; of one body under ""
 
-MOTION, JOINTS = "tables/smooth_motion.csv", "tables/smooth_joints.csv"
+MOTION = "tables/smooth_motion.csv"
 ANGLES, EVENTS = "tables/smooth_joint_angles.csv", "tables/smooth_events.csv"
 RESIDUALS_FIGURE = "figures/residuals.png"
 
@@ -167,9 +168,9 @@ def _players_run(folder: Path) -> _Run:
     ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
         times = {name: [event.time_s for event in events[name]] for name in motion.players}
         joints = smooth_players(motion, smoothing, times, progress)
-        write_smooth_joints(out / JOINTS, joints)
+        write_smooth_joints(out / SMOOTH_JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
-        return {"joints": joints}, (JOINTS, EVENTS)
+        return {"joints": joints}, (SMOOTH_JOINTS, EVENTS)
 
     paths = motion.points.reshape(len(motion), -1, 3)
     owners = tuple(name for name in motion.players for _ in motion.joints)
@@ -189,13 +190,13 @@ def _body_run(folder: Path, images: Trial | None) -> _Run:
         root = smooth_root(motion, model, smoothing, times)
         joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
         write_smooth_motion(out / MOTION, root)
-        write_smooth_joints(out / JOINTS, joints)
+        write_smooth_joints(out / SMOOTH_JOINTS, joints)
         write_smooth_events(out / EVENTS, events, joints)
-        tables, files = {"root": root, "joints": joints}, (MOTION, JOINTS, EVENTS)
+        tables, files = {"root": root, "joints": joints}, (MOTION, SMOOTH_JOINTS, EVENTS)
         if motion.joints:
             tables["angles"] = smooth_joint_angles(motion, model, smoothing, times)
             write_smooth_joint_angles(out / ANGLES, tables["angles"])
-            files = (MOTION, JOINTS, ANGLES, EVENTS)
+            files = (MOTION, SMOOTH_JOINTS, ANGLES, EVENTS)
         for table in tables.values():
             table.attrs["history"] = [*notes, *table.attrs["history"]]
         return tables, files
