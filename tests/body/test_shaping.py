@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Inertia, Landmark, Mesh, Part, Pose, Segment, human18
-from airborne.body.shaping import length_axis, with_girths, with_mass, with_segment_lengths
+from airborne.body.shaping import length_axis, stretch_mesh, with_girths, with_mass, with_segment_lengths
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
@@ -119,6 +119,19 @@ def test_inertia_is_that_of_the_stretched_solid():
         np.testing.assert_allclose(found.tensor_kg_m2, expected.tensor_kg_m2, rtol=ROUNDTRIP, atol=ROUNDTRIP)
         kept = inertia(mass, place).centre_m
         np.testing.assert_allclose(found.centre_m, kept if change is with_girths else expected.centre_m, atol=ROUNDTRIP)
+
+
+def test_normals_of_a_stretched_mesh_stand_on_it():
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1)
+    vertices, turn = np.asarray(ball.vertices, float), Rotation.from_rotvec([0.3, -0.8, 0.5])
+    mesh = Mesh(vertices, np.asarray(ball.faces, np.int64), vertices / 0.1)
+    factors = np.array([0.7, 1.4, 1.1])
+    stretched = stretch_mesh(mesh, factors, turn.as_matrix())
+    local = turn.apply(stretched.vertices_m)
+    np.testing.assert_allclose(local, turn.apply(vertices) * factors, atol=1e-12)
+    gradient = local / factors**2  # of the ellipsoid
+    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+    np.testing.assert_allclose(turn.apply(stretched.normals), gradient, atol=1e-12)
 
 
 def test_boxes_and_meshes_stretch_and_oblique_boxes_are_refused():

@@ -9,11 +9,13 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.body import ATHLETE, SAMPLED, BodyModel, Pose, human18, human18_from_measurements, surface_arrays
 from airborne.body.anthropometry import measurements_of
-from airborne.body.skin import skin_of
+from airborne.body.shaping import with_girths, with_segment_lengths
+from airborne.body.skin import skin_of, stretch_skin
 from airborne.body.stadia import stadium
 from airborne.cameras import Camera
 from airborne.errors import BodyError
 from airborne.rendering import FLAT, render
+from tests.support.motions import figure
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 PERSON = human18(1.80, 75.0)
@@ -199,3 +201,28 @@ def test_errors_for_other_bodies_name_what_is_missing():
     with pytest.raises(BodyError, match="joints lie up to"):
         skin_of(replace(PERSON, segments=joints))
     np.testing.assert_allclose(PERSON.segments[0].joint_m, 0, atol=EXACT)
+
+
+def test_skin_stretches_with_the_body():
+    def other(model):
+        model = with_segment_lengths(model, {"thigh": 1.1, "torso": 0.94, "foot": 0.9})
+        return with_girths(model, {"shank": 1.2, "chest": (1.1, 0.9), "head": (0.95, 1.05), "foot": 1.1})
+
+    stretched, of_base = stretch_skin(other(human18())), other(stretch_skin(human18()))
+    assert stretched is not None
+    for found, expected in zip(stretched.segments, of_base.segments, strict=True):
+        np.testing.assert_allclose(found.joint_m, expected.joint_m, atol=EXACT)
+        for own, part in zip(found.parts, expected.parts, strict=True):
+            np.testing.assert_allclose(own.shape.vertices_m, part.shape.vertices_m, atol=ROUNDTRIP)
+            np.testing.assert_allclose(own.shape.normals, part.shape.normals, atol=0.02)  # cut before or after
+
+
+def test_skin_of_another_stature_is_about_as_thick_as_its_ellipsoids():
+    body = human18(1.65, 80.0)
+    drawn = [masks(each, turn=0.5).mask for each in (body, stretch_skin(body))]
+    assert np.sum(drawn[0] ^ drawn[1]) < 0.15 * drawn[0].sum()
+
+
+@pytest.mark.parametrize("body", [PLAIN, figure()], ids=["of meshes", "of other segments"])
+def test_a_body_of_other_segments_or_shapes_has_no_such_skin(body):
+    assert stretch_skin(body) is None

@@ -7,6 +7,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import ATHLETE, Pose, human18
 from airborne.body.chain import move_pose
 from airborne.body.outfits import Border, ellipsoid_of
+from airborne.body.skin import stretch_skin
 from airborne.body_fitting.shape import apply_shape, border_parameters, shape_parameters
 from airborne.body_fitting.shape_motion import ShapeMotion
 
@@ -28,6 +29,25 @@ def surface_points(shape, pose, at):
     solids = [ellipsoid_of(model, segment.name) for segment in model.segments]
     local = np.array([centre + at * solid.semi_axes_m for solid, centre in solids])
     return np.einsum("sij,sj->si", posed.R, local) + posed.t, posed
+
+
+def test_a_skin_moves_with_its_girths_as_their_derivatives_say():
+    skin, pose = stretch_skin(human18()), a_pose()
+    parameters = tuple(each for each in shape_parameters(skin) if each.kind == "girth")
+    motion, posed = ShapeMotion.of(skin, parameters), skin.with_pose(pose)
+
+    def vertices(shape):
+        model = apply_shape(skin, parameters, shape)
+        local = [part.segment_from_part.apply(part.shape.vertices_m) for part in model.parts]
+        return [points @ posed.R[k].T + posed.t[k] for points, k in zip(local, owners, strict=True)]
+
+    owners = [k for k, segment in enumerate(skin.segments) for _ in segment.parts]
+    J, here = motion.surface_jacobian(posed), vertices(np.zeros(len(parameters)))
+    for index in range(len(parameters)):
+        ahead, back = (vertices(sign * STEP * np.eye(len(parameters))[index]) for sign in (1, -1))
+        for k, points, end, start in zip(owners, here, ahead, back, strict=True):
+            found = J[k, :3, index] + (points - posed.t[0]) @ J[k, 3:12, index].reshape(3, 3).T
+            np.testing.assert_allclose(found, (end - start) / (2 * STEP), atol=1e-6)
 
 
 @pytest.mark.parametrize("is_shape", [True, False])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from airborne.body.model import BodyModel, Box, Ellipsoid, Inertia, Part, Segment, Shape
+from airborne.body.model import BodyModel, Box, Ellipsoid, Inertia, Mesh, Part, Segment, Shape
 from airborne.errors import BodyError
 from airborne.types import Array
 
@@ -85,6 +85,16 @@ def half_size_m(part: Part) -> Array:
     else:
         half = shape.size_m / 2 if isinstance(shape, Box) else np.ptp(shape.vertices_m, axis=0) / 2
     return np.abs(part.segment_from_part.rotation.as_matrix()) @ half
+
+
+def stretch_mesh(mesh: Mesh, factors: Array, axes: Array | None = None) -> Mesh:
+    """Return a mesh stretched by factors (3,) along axes, rows of (3, 3) in its frame, by default the frame's own."""
+    to = np.eye(3) if axes is None else axes
+    normals = mesh.normals
+    if normals is not None:
+        normals = normals @ (to.T / factors) @ to
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return replace(mesh, vertices_m=mesh.vertices_m @ (to.T * factors) @ to, normals=normals)
 
 
 def half_widths_m(model: BodyModel) -> Array:
@@ -165,5 +175,4 @@ def _part(part: Part, shape: Array, position: Array) -> Part:
         return replace(
             part, shape=scaled, segment_from_part=moved, slab_m=(part.slab_m[0] * own[2], part.slab_m[1] * own[2])
         )
-    vertices = rotation.apply(rotation.apply(part.shape.vertices_m) * shape, inverse=True)
-    return replace(part, shape=replace(part.shape, vertices_m=vertices), segment_from_part=moved)
+    return replace(part, shape=stretch_mesh(part.shape, shape, rotation.as_matrix()), segment_from_part=moved)

@@ -14,10 +14,11 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body.anthropometry import measurements_of
-from airborne.body.human import human18_from_measurements
+from airborne.body.human import human18, human18_from_measurements
 from airborne.body.measurements import STATURE_SHARES, Measurements
 from airborne.body.model import BodyModel, Ellipsoid, Mesh, Part, Segment
 from airborne.body.nurbs import RationalSurface, stadium_loft
+from airborne.body.outfits import ellipsoid_of
 from airborne.body.sections import (
     Profile,
     Values,
@@ -27,6 +28,7 @@ from airborne.body.sections import (
     shoulder_profile,
     trunk_profile,
 )
+from airborne.body.shaping import stretch_mesh
 from airborne.body.splitting import faces_between, split_at
 from airborne.errors import BodyError
 from airborne.types import Array
@@ -46,7 +48,8 @@ _STATIONS = {  # the two ends of a segment's loft; neighbouring segments share t
 }
 _LEVELS = sorted({name for ends in _STATIONS.values() for name in ends})
 _SAME_JOINT_M, _SAME_MASS = 5e-4, 5e-3  # [m], relative: a body this close to the preset's has the same person's skin
-_FEWEST_ALONG, _MOST_ALONG = 24, 48  # rings of vertices along a segment
+_RINGS = (24, 48)  # of vertices along a segment, at least and at most
+_FITTED_RINGS, _FITTED_AROUND = (6, 12), 12  # of a skin that is fitted to images: 3700 triangles
 
 
 def skin_of(
@@ -72,14 +75,41 @@ def skin_of(
     shifts = dict(zip(_STATIONS, border_change_m * rng.uniform(-1, 1, len(_STATIONS)), strict=True))
     segments = []
     for segment in model.segments:
-        kind, side = _kind_and_side(segment.name)
-        profile = _profile(model, segment, (person.mirror() if side == "right" else person).values_m)
+        kind = _kind_and_side(segment.name)[0]
         first, last = _STATIONS[kind]
-        mesh = _mesh(stadium_loft(profile.stations(girths[first], girths[last])), profile.axes, n_around)
-        if side == "right":
-            mesh = _transform_mesh(mesh, np.diag([-1.0, 1, 1]))
+        mesh = _skin_of_segment(model, segment, person, (girths[first], girths[last]), n_around=n_around, rings=_RINGS)
         segments.append(replace(segment, parts=_cut_skin(segment, mesh, shifts[kind])))
     return replace(model, name=f"{model.name} skin", segments=tuple(segments))
+
+
+def stretch_skin(model: BodyModel) -> BodyModel | None:
+    """Clothe a body of `human18`'s segments, of any lengths and girths, in a smooth skin; None for another body.
+
+    Each segment's skin is that of `human18()`, stretched along the segment's axes as its ellipsoid has to be to become
+    the model's. It is cut where the model's colours change, and coarse enough to be drawn often.
+    """
+    base = human18()
+    if [segment.name for segment in model.segments] != [segment.name for segment in base.segments]:
+        return None
+    try:
+        solids = [[ellipsoid_of(body, segment.name) for body in (base, model)] for segment in model.segments]
+    except BodyError:
+        return None
+    person, segments = _person_of(base, None), []
+    for own, segment, ((old, old_m), (new, new_m)) in zip(model.segments, base.segments, solids, strict=True):
+        mesh = _skin_of_segment(base, segment, person, (1, 1), n_around=_FITTED_AROUND, rings=_FITTED_RINGS)
+        mesh = stretch_mesh(replace(mesh, vertices_m=mesh.vertices_m - old_m), new.semi_axes_m / old.semi_axes_m)
+        mesh = replace(mesh, vertices_m=mesh.vertices_m + new_m)
+        segments.append(replace(own, parts=tuple(_about(part, new_m) for part in _cut_skin(own, mesh, 0.0))))
+    return replace(model, segments=tuple(segments))
+
+
+def _about(part: Part, centre_m: Array) -> Part:
+    """Return a mesh in a frame whose origin lies elsewhere in the segment's: girths scale about that."""
+    shape = part.shape
+    assert isinstance(shape, Mesh)
+    moved = replace(shape, vertices_m=shape.vertices_m - centre_m)
+    return replace(part, shape=moved, segment_from_part=RigidTransform.from_translation(centre_m))
 
 
 def _person_of(model: BodyModel, measurements: Measurements | None) -> Measurements:
@@ -108,6 +138,22 @@ def _person_of(model: BodyModel, measurements: Measurements | None) -> Measureme
     )
 
 
+def _skin_of_segment(
+    model: BodyModel,
+    segment: Segment,
+    person: Measurements,
+    girths: tuple[float, float],
+    *,
+    n_around: int,
+    rings: tuple[int, int],
+) -> Mesh:
+    """Return a segment's whole skin in its frame, with factors on the girths at the two ends of its loft."""
+    side = _kind_and_side(segment.name)[1]
+    profile = _profile(model, segment, (person.mirror() if side == "right" else person).values_m)
+    mesh = _mesh(stadium_loft(profile.stations(*girths)), profile.axes, n_around, rings)
+    return _transform_mesh(mesh, np.diag([-1.0, 1, 1])) if side == "right" else mesh
+
+
 def _kind_and_side(name: str) -> tuple[str, str]:
     kind, _, side = name.rpartition("_")
     return (kind, side) if side in ("left", "right") else (name, "")
@@ -131,13 +177,13 @@ def _profile(model: BodyModel, segment: Segment, values: Values) -> Profile:
     return arm_profile(kind, values) if kind in ("upper_arm", "forearm", "hand") else leg_profile(kind, values)
 
 
-def _mesh(surface: RationalSurface, axes: Array, n_around: int) -> Mesh:
-    """Tessellate with facets about as long as wide, in the segment's frame."""
+def _mesh(surface: RationalSurface, axes: Array, n_around: int, rings: tuple[int, int]) -> Mesh:
+    """Tessellate with facets about as long as wide, in the segment's frame, with so many rings at least and at most."""
     sections = surface.points(surface.knots[0][:1], np.linspace(0, 1, 9))[0]
     length = np.linalg.norm(np.diff(sections, axis=0), axis=1).sum()
     ring = surface.points(np.linspace(0, 1, 25), np.array([0.5]))[:, 0]
     around = np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()
-    n_along = int(np.clip(round(n_around * length / around), _FEWEST_ALONG, _MOST_ALONG))
+    n_along = int(np.clip(round(n_around * length / around), *rings))
     mesh = surface.mesh(n_around, n_along)
     return _transform_mesh(mesh, axes)
 

@@ -15,6 +15,7 @@ from airborne.body import BodyModel, Part, PosedBody
 from airborne.body.colours import with_sampled_colours
 from airborne.body.outfits import Border, ellipsoid_of, extent_m
 from airborne.body.shaping import length_axis
+from airborne.errors import BodyError
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -110,6 +111,8 @@ def sample_clothing(model: BodyModel, views: Sequence[PosedView]) -> BodyModel:
     render_model = RenderModel.of(uncoloured)
     pixels: dict[str, list[NDArray[np.uint8]]] = defaultdict(list)
     keys = [_key(part) for part in model.parts]
+    if not views:
+        raise BodyError("the body lies in no camera's image; give frames that show it")
     for _, posed, region in views:
         part_map = render_model.draw_parts(PosedBody(uncoloured, posed.R, posed.t), region)
         interior = _interior(part_map)

@@ -124,26 +124,28 @@ def fit_body(
     weights: Mapping[str, float] | None = None,
     mass_kg: float | None = None,
     levels_px_per_m: Sequence[float] = _LEVELS_PX_PER_M,
+    girths_alone: bool = False,
     progress: Progress | None = None,
 ) -> BodyFit:
     """Fit a body with joints to a person observed at a few times.
 
     `scenery` are further times from which the background is learned; `weights` are those of each landmark's squared
     distance, 1 where not named. Left and right are alike. Masses and inertias follow the shape at constant density, or
-    add up to `mass_kg`. The images are compared from coarse to fine, reduced to `levels_px_per_m` where larger. Raises
-    BodyError where the landmarks determine no pose, and where the images do not show a part of the body.
+    add up to `mass_kg`. The images are compared from coarse to fine, reduced to `levels_px_per_m` where larger. With
+    `girths_alone`, lengths, widths between joints and the clothes' borders stay. Raises BodyError where the landmarks
+    determine no pose, and where the images do not show a part of the body.
     """
     if not observations:
         raise BodyError("no frame to fit the body to; give at least one with known landmarks")
     landmarks = tuple(_landmarks(model, each.landmarks) for each in observations)
-    lengths = measure_lengths(model, [each.landmarks for each in observations])
+    lengths = {} if girths_alone else measure_lengths(model, [each.landmarks for each in observations])
     start = with_segment_lengths(model, lengths)
     all_times = (*observations, *scenery)
     initial = tuple(_pose_from_landmarks(start, each, weights) for each in observations)
     for each in scenery:
         nearest = min(range(len(observations)), key=lambda i: abs(observations[i].frames.index - each.frames.index))
         initial += (_pose_from_landmarks(start, each, weights, initial[nearest]),)
-    parameters = shape_parameters(start)
+    parameters = tuple(each for each in shape_parameters(start) if not girths_alone or each.kind == "girth")
     state = _Iterate(np.zeros(len(parameters)), initial[: len(observations)])
     report = progress or (lambda done, total: None)
     for number, px_per_m in enumerate(levels_px_per_m):
@@ -155,7 +157,7 @@ def fit_body(
         background = learn_background(current, images, poses, girth=girth, margin_px=margin_px)
         observed = images[: len(observations)]
         views = pose_views(current, state.poses, observed)
-        borders = find_borders(current, views)
+        borders = {} if girths_alone else find_borders(current, views)
         dressed = sample_clothing(with_borders(current, borders), views)
         all_parameters = (*parameters, *border_parameters(current, borders))
         state = _Iterate(

@@ -13,7 +13,7 @@ import numpy as np
 
 from airborne.body import BodyModel, PosedBody
 from airborne.body.chain import point_jacobian, segment_jacobians
-from airborne.body.outfits import ellipsoid_of, extent_m
+from airborne.body.outfits import extent_m
 from airborne.body.shaping import length_axis
 from airborne.body_fitting.shape import ShapeParameter, segments_of
 from airborne.types import Array
@@ -77,7 +77,8 @@ class ShapeMotion:
         across = np.flatnonzero(~on_axis)
         chosen = np.isin(np.arange(3), across if parameter.axis is None else across[parameter.axis])
         self.scale[index, segment] = chosen
-        self.shift[index, segment] = -ellipsoid_of(model, name)[1] * chosen
+        centre_m = model.segments[segment].parts[0].segment_from_part.translation
+        self.shift[index, segment] = -centre_m * chosen
 
     def joints(self, posed: PosedBody) -> Array:
         """Return how the segments' joints move: (k, s, 3) world [m]."""

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from airborne.body import BodyModel, Pose
+from airborne.body_fitting.skin import N_FRAMES, fit_skin
 from airborne.errors import ResultError
 from airborne.motion import Motion, read_estimates
 from airborne.motion.flight.momentum_table import falls_freely
@@ -17,9 +18,10 @@ from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run
 from airborne.motion.smoothing.segments import segment_numbers, stretches
 from airborne.run.folder import require_run_of
 from airborne.run.opening import open_trial
-from airborne.tracking import Estimate
+from airborne.tracking import Estimate, Status
 from airborne.tracking.methods import Settings, sample_body_colours, tracker_of
 from airborne.tracking.model_based.image_evidence import ImageEvidence
+from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker
 from airborne.trial.file import Trial
 from airborne.types import Progress
@@ -69,6 +71,7 @@ class _RunImages:
     estimates: Sequence[Estimate]  # those with a pose
     progress: Progress | None
     learned: CompensatedState
+    skin: RenderModel | None = None  # which is compared with the images instead of the body's ellipsoids
     misfits: Sequence[float] = ()  # of the frames, as first seen
     _n_read: int = field(default=0)
 
@@ -81,8 +84,15 @@ class _RunImages:
         model = sample_body_colours(model, start, next(reader.forward(estimates[0].index, None)))
         tracker = tracker_of(Settings(lights=known.lights, is_light_exact=known.is_light_exact), model, start)
         images = cls(reader, tracker, estimates, progress, tracker.init())
+        tracked = [each.index for each in estimates if each.status is Status.TRACKED]
+        fitted = {tracked[k] for k in np.linspace(0, len(tracked) - 1, N_FRAMES).astype(int)} if tracked else set()
+        found = list[tuple[Frames, Pose]]()
         for frames, estimate in zip(images._frames(), estimates, strict=True):
             images.learned = tracker.learn(images.learned, frames, estimate)
+            if estimate.index in fitted and estimate.pose is not None:
+                found.append((frames, estimate.pose))
+        skin = fit_skin(model, found)
+        images.skin = None if skin is None else RenderModel.of(skin, known.lights if known.is_light_exact else None)
         return images
 
     def look(self, poses: Sequence[Pose]) -> list[ImageEvidence]:
@@ -91,7 +101,7 @@ class _RunImages:
         for i, (frames, pose) in enumerate(zip(self._frames(), poses, strict=True)):
             path.append((frames.time_s, pose))
             misfit = self.misfits[i] if self.misfits else None
-            evidence.append(self.tracker.linearise(self.learned, frames, path, misfit))
+            evidence.append(self.tracker.linearise(self.learned, frames, path, misfit, surface=self.skin))
         self.misfits = [each.misfit for each in evidence]
         return evidence
 

@@ -19,6 +19,7 @@ from airborne.body import Pose
 from airborne.body.chain import delta_between
 from airborne.tracking.estimate import Estimate
 from airborne.tracking.model_based.image_evidence import ImageEvidence
+from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.predictors import PoseHistory, turn_past
 from airborne.tracking.revision import FrameRecord
 from airborne.types import Array
@@ -82,11 +83,17 @@ class CompensatedTracker:
         return self._tracker.weigh(state.inner, compensate_offsets(frames, state.past), poses)
 
     def linearise(
-        self, state: CompensatedState, frames: Frames, past: PoseHistory, misfit: float | None = None
+        self,
+        state: CompensatedState,
+        frames: Frames,
+        past: PoseHistory,
+        misfit: float | None = None,
+        *,
+        surface: RenderModel | None = None,
     ) -> ImageEvidence:
         """Return what the images say about the newest of the poses in `past`, which is that of the frames."""
         compensated = compensate_offsets(frames, past[-_HISTORY:])
-        return self._tracker.linearise(state.inner, compensated, past[-1][1], misfit)
+        return self._tracker.linearise(state.inner, compensated, past[-1][1], misfit, surface=surface)
 
 
 def _compensate_record(record: FrameRecord) -> FrameRecord:

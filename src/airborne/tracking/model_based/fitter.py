@@ -163,9 +163,10 @@ class Fitter:
         return self._assess(fit, self._find_faults(fit.pose, learned), learned)
 
     def limbs_asked(self, pose: Pose, learned: LearnedRegions) -> tuple[int, ...]:
-        """Return the first segments of the limbs that ask for a search, were this pose the body's."""
-        asked = self._find_faults(pose, learned).limbs_asked(self.model) if self.moves_joints else ()
-        return _first_segments(asked)
+        """Return the first segments of the limbs that ask for a search in a pose; none without colours."""
+        if not self.moves_joints or not learned.masks.regions:
+            return ()
+        return _first_segments(self._find_faults(pose, learned).limbs_asked(self.model))
 
     def _assess(self, fit: Fit, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
         segments = tuple(int(segment) for limb in faults.misplaced for segment in limb)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airborne.appearance.model import Appearance
-from airborne.body import Pose
+from airborne.body import BodyModel, Pose
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints, linearise_prior
 from airborne.tracking.model_based.gauss_newton import linearise_images
@@ -36,13 +36,20 @@ class ImageEvidence:
 
 
 def image_evidence(
-    render_model: RenderModel, pose: Pose, frames: Frames, appearance: Appearance, *, misfit: float | None = None
+    render_model: RenderModel,
+    model: BodyModel,
+    pose: Pose,
+    frames: Frames,
+    appearance: Appearance,
+    *,
+    misfit: float | None = None,
 ) -> ImageEvidence:
-    """Linearise the images about a pose; None where they are weighed by the misfit that they show there.
+    """Linearise the images about a pose; misfit: None where they are weighed by that which they show there.
 
-    Costs of several poses can be compared if their misfit is the same.
+    Costs of several poses can be compared if their misfit is the same. What is possible for the body is that of the
+    model, which differs from the one that is drawn in its surface at most.
     """
-    posed, dofs = render_model.with_pose(pose), all_joints(render_model.model)
+    posed, dofs = render_model.with_pose(pose), all_joints(model)
     regions = crop_regions([posed], render_model.geometry, frames, MARGIN_PX)
     regions = [region for region in regions if appearance.has_colours(region)]
     appearance = learn_missing_backgrounds(render_model, posed, regions, appearance)

@@ -48,8 +48,7 @@ _HISTORY = 3  # poses that predict
 # share of the reference's precision and recall from which colours and backgrounds are learned in turns; if they always
 # are, light that doubles within twelve frames is lost
 _STEADY = 0.98
-# frames, in which a limb that was searched for in vain is searched for again; ten synthetic somersaults are tracked as
-# well as with 1, one of four worse with 4
+# a limb searched for in vain waits for such a frame: ten somersaults end as with 1, of four one is worse with 4
 _SEARCH_EVERY = 3
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 
@@ -126,9 +125,8 @@ class RefinedTracker:
         past = (*before, (frames.time_s, estimate.pose))[-_HISTORY:]
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
-        asked = (
-            self._limbs_asked(estimate.pose, regions, state.appearance) if estimate.asked is None else estimate.asked
-        )
+        if (asked := estimate.asked) is None:  # rows say nothing of it
+            asked = self._fitter.limbs_asked(estimate.pose, LearnedRegions.of(regions, state.appearance))
         if estimate.status is not Status.TRACKED and state.past:
             return replace(state, past=past, covariance=estimate.covariance, asked=asked)
         motion = self._motion(before, frames)
@@ -154,11 +152,6 @@ class RefinedTracker:
         learned = LearnedRegions.of(regions, known)
         return self._fitter.agreement(pose, learned).shares if learned.masks.regions else None
 
-    def _limbs_asked(self, pose: Pose, regions: Sequence[Region], known: Appearance) -> tuple[int, ...]:
-        """Return the limbs that ask for a search in a pose; none where no region's colours have been learned."""
-        learned = LearnedRegions.of(regions, known)
-        return self._fitter.limbs_asked(pose, learned) if learned.masks.regions else ()
-
     def turn(self, state: RefinedState) -> RefinedState:
         """Return the state from which the body is tracked back in time: the past is as it would be met then."""
         return replace(state, past=predictors.turn_past(state.past))
@@ -169,9 +162,18 @@ class RefinedTracker:
         learned = regions_near(self._fitter, poses, frames, state.appearance)
         return self._fitter.weigh(poses, learned) if learned.masks.regions else np.zeros(len(poses))
 
-    def linearise(self, state: RefinedState, frames: Frames, pose: Pose, misfit: float | None = None) -> ImageEvidence:
-        """Return what the images say about a pose, without any prediction; see `image_evidence`."""
-        return image_evidence(self.render_model, pose, self.reduce_frames(frames), state.appearance, misfit=misfit)
+    def linearise(
+        self,
+        state: RefinedState,
+        frames: Frames,
+        pose: Pose,
+        misfit: float | None = None,
+        *,
+        surface: RenderModel | None = None,
+    ) -> ImageEvidence:
+        """Return what the images say about a pose of the body, or of another surface of it; see `image_evidence`."""
+        args = pose, self.reduce_frames(frames), state.appearance
+        return image_evidence(surface or self.render_model, self._fitter.model, *args, misfit=misfit)
 
     def revise(self, records: Sequence[FrameRecord], state: RefinedState) -> dict[int, Estimate]:
         """Return better estimates of earlier records, where limbs that the newest moved have been by then."""
