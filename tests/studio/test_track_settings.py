@@ -18,6 +18,7 @@ def test_method_and_last_frame_are_written_into_the_trial_and_undone(tmp_path):
         method, last = page.get_by_label("method"), page.get_by_label("last frame")
         assert (method.input_value(), last.input_value()) == (PLAYERS_METHODS[0], str(N - 1))
         method.click()
+        page.get_by_role("option").first.wait_for()
         assert page.get_by_role("option").all_text_contents() == list(PLAYERS_METHODS)
         page.get_by_role("option", name=PLAYERS_METHODS[1], exact=True).click()
         last.fill(str(N))

@@ -48,7 +48,8 @@ def reduce_frames(frames: Frames, body: PosedBody, most_px_per_m: float) -> Fram
 def _reduce_view(view: View | None, body: PosedBody, most_px_per_m: float) -> View | None:
     if view is None:
         return None
-    depth_m = max(float(view.camera.camera_from_world.apply(body.t[0])[2]), 0.1)
+    x, y, z, offset = view.camera.camera_from_world.as_matrix()[2]
+    depth_m = max(float(np.dot([x, y, z], body.t[0]) + offset), 0.1)
     n = round(view.camera.K[0, 0] / depth_m / most_px_per_m)
     if n < 2:
         return view
