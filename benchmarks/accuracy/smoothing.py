@@ -49,7 +49,7 @@ def measure(name: str, folder: Path, run: Path) -> list[dict]:
         {**common, "method": "tracked", "metric": "without offset", "unit": "mm", "value": tracked_mm[1]},
         {**common, "method": "tracked", "metric": "angular velocity, RMS", "unit": "rad/s", "value": tracked_w},
     ]
-    fitted = fit_to_images(run, read_trial(folder / "trial.toml"), motion, model)
+    fitted, _ = fit_to_images(run, read_trial(folder / "trial.toml"), motion, model)
     for method, each in {"kalman": motion, "images, kalman": fitted}.items():
         joints, root = smooth_landmarks(each, model, _KALMAN, []), smooth_root(each, model, _KALMAN, [])
         smooth, sd = (joints[key].to_numpy()[:, : len(model.landmarks)] for key in ("position", "position_sd"))

@@ -24,10 +24,9 @@ N, SCALE = 13, 4
 OFF_M, OFF_RAD = 0.01, 0.05  # by which poses are wrong in every frame, in each direction
 
 
-@pytest.fixture(scope="module")
-def scene():
+def scene_of(target):
     """The beginning of a somersault, small."""
-    scene = somersault_scene("moving-arms", target="ellipsoids")
+    scene = somersault_scene("moving-arms", target=target)
     middle = (SCALE - 1) / 2
     cameras = (
         each.resample(
@@ -39,9 +38,17 @@ def scene():
 
 
 @pytest.fixture(scope="module")
+def scene():
+    return scene_of("ellipsoids")
+
+
+@pytest.fixture(scope="module")
 def folder(scene, tmp_path_factory):
+    return run_of(scene, tmp_path_factory.mktemp("somersault"))
+
+
+def run_of(scene, folder):
     """Its trial, and a run of it whose poses are a little wrong in every frame, without one that was lost."""
-    folder = tmp_path_factory.mktemp("somersault")
     write_trial(scene, folder / "trial")
     run, model, rng = folder / "run", scene.model, np.random.default_rng(4)
     run.mkdir()
@@ -91,8 +98,20 @@ def test_images_say_more_than_the_tracked_poses(scene, folder, tmp_path):
     assert in_process("smooth", run, "--events", "none", "--images", trial, "-o", tmp_path / "images") == 0
     plain, images = (errors_mm(scene, tmp_path / name / "tables/smooth_joints.csv") for name in ("plain", "images"))
     assert images < 0.6 * plain
-    assert "fitted at once to its images" in json.loads((tmp_path / "images/smooth.json").read_text())["history"][0]
+    how = json.loads((tmp_path / "images/smooth.json").read_text())["history"][0]
+    assert "fitted at once to its images by the body's surface" in how
     assert contents_of(folder) == before
+
+
+def test_a_person_is_compared_in_a_skin(tmp_path):
+    scene = scene_of("skin")
+    folder = run_of(scene, tmp_path / "skin")
+    run, trial = folder / "run", folder / "trial" / "trial.toml"
+    assert in_process("smooth", run, "--events", "none", "-o", tmp_path / "plain") == 0
+    assert in_process("smooth", run, "--events", "none", "--images", trial, "-o", tmp_path / "images") == 0
+    plain, images = (errors_mm(scene, tmp_path / name / "tables/smooth_joints.csv") for name in ("plain", "images"))
+    assert images < 0.6 * plain
+    assert "by a smooth skin" in json.loads((tmp_path / "images/smooth.json").read_text())["history"][0]
 
 
 def test_another_trial_and_another_method_are_refused(folder, capsys):

@@ -9,16 +9,13 @@ from airborne.appearance.model import Appearance
 from airborne.body import Pose
 from airborne.body.chain import clamp_to_limits
 from airborne.tracking.image_regions import crop_regions
-from airborne.tracking.model_based import fitter
-from airborne.tracking.model_based.degrees_of_freedom import PosePrior, limb_of_segment, limbs_of
+from airborne.tracking.model_based.degrees_of_freedom import PosePrior, limb_of_segment
 from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
-from airborne.tracking.model_based.refined import RefinedState, RefinedTracker
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.tracking.model_based.status import Reference
 from tests.support.people import HUMAN, mean_errors_mm, person, tracker
 from tests.support.scenes import statuses, track
 
@@ -108,8 +105,8 @@ def test_limbs_that_are_not_where_they_were_expected_are_moved_and_stay(frame, n
         expected = fold(expected, name, FOLDS[name])
     prior = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1))
     learned = LearnedRegions(Posteriors(*frame.views(expected)), frame.appearance)
-    of_body = Fitter.of(frame.render_model, "refined", fixed_shape=False)
-    judged = of_body.judge(of_body.fit_images([expected], learned, prior), [expected], learned, prior)
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    judged = fitter.judge(fitter.fit_images([expected], learned, prior), [expected], learned, prior)
     for name in names:
         assert frame.off_mm(expected, limb_with(name)) > 450
         assert frame.off_mm(judged.fit.pose, limb_with(name)) < 60
@@ -119,51 +116,7 @@ def test_limb_that_was_expected_stays_where_one_colour_shows_no_better_place(fra
     expected = frame.truth
     prior = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1))
     learned = LearnedRegions(Posteriors(*frame.views(expected)), frame.appearance)
-    of_body = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
     folded = [fold(expected, name, turn) for name, turn in FOLDS.items()]
-    judged = of_body.judge(of_body.fit_images([expected], learned, prior), folded, learned, prior)
+    judged = fitter.judge(fitter.fit_images([expected], learned, prior), folded, learned, prior)
     assert frame.off_mm(judged.fit.pose, np.arange(len(HUMAN.segments))) < 20
-
-
-@pytest.fixture
-def searched(monkeypatch):
-    """The first segments of the limbs that are searched for, as they are."""
-    limbs = []
-
-    def search(render_model, poses, limb, maps):
-        limbs.append(int(limb[0]))
-        return search_limb(render_model, poses, limb, maps)
-
-    monkeypatch.setattr(fitter, "search_limb", search)
-    return limbs
-
-
-LIMBS = [int(limb[0]) for limb in limbs_of(HUMAN)]
-
-
-@pytest.mark.parametrize("name", FOLDS)
-def test_limb_that_waits_is_not_searched_for_and_asks_on(frame, searched, name):
-    limb, expected = int(limb_with(name)[0]), fold(frame.truth, name, FOLDS[name])
-    learned = LearnedRegions(Posteriors(*frame.views(expected)), frame.appearance)
-    of_body = Fitter.of(frame.render_model, "refined", fixed_shape=False)
-    fit = of_body.fit_images([expected], learned, None)
-    waited = of_body.judge(fit, [expected], learned, None, waiting=LIMBS)
-    assert searched == []
-    assert waited.fit is fit
-    assert limb in waited.asked
-    found = of_body.judge(fit, [expected], learned, None, waiting=set(LIMBS) - {limb})
-    assert searched[0] == limb
-    assert limb not in found.asked
-
-
-@pytest.mark.parametrize("index", range(3))
-@pytest.mark.parametrize("name", FOLDS)
-def test_limb_that_was_searched_for_in_vain_is_searched_for_in_every_third_frame(frame, searched, name, index):
-    seeker, limb = RefinedTracker(HUMAN, frame.truth), int(limb_with(name)[0])
-    past = ((frame.frames.time_s - 1, fold(frame.truth, name, FOLDS[name])),)
-    state = RefinedState(past, frame.appearance, Reference(0.0, 0.0), asked=tuple(LIMBS))
-    estimate = seeker.search(state, replace(frame.frames, index=index))
-    assert all(each % 3 == index for each in searched[:1])
-    assert limb in searched or limb % 3 != index
-    for known in (estimate, replace(estimate, asked=None)):
-        assert seeker.learn(state, frame.frames, known).asked == estimate.asked

@@ -37,8 +37,8 @@ def fit_to_images(
     *,
     boundaries_s: Sequence[float] = (),
     progress: Progress | None = None,
-) -> Motion:
-    """Return a run's motion with the most probable poses, given its images and how bodies move; see `run_fit`.
+) -> tuple[Motion, str]:
+    """Return a run's motion with the most probable poses, given its images and how bodies move, and how; see `run_fit`.
 
     Motion is smooth between boundaries and gaps, in stretches of five frames or more; other frames stay as they are.
     So do the covariances: those of the frames one by one, which are wider. Raises ResultError for a trial that is not
@@ -59,7 +59,9 @@ def fit_to_images(
     position, R, angles = motion.position.copy(), motion.R.copy(), motion.joint_angles.copy()
     position[posed], R[posed] = matrices[:, :3, 3], matrices[:, :3, :3]
     angles[posed] = [pose.joint_angles for pose in poses]
-    return replace(motion, position=position, R=R, joint_angles=angles)
+    surface = "the body's surface" if images.skin is None else "a smooth skin, its girths fitted to them"
+    how = f"the whole run was fitted at once to its images by {surface}, with smooth accelerations and free falls"
+    return replace(motion, position=position, R=R, joint_angles=angles), how
 
 
 @dataclass(slots=True, eq=False)

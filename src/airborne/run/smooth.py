@@ -185,8 +185,8 @@ def _body_run(folder: Path, images: Trial | None) -> _Run:
     ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
         times, motion, notes = [event.time_s for event in events[""]], tracked, list[str]()
         if images is not None:
-            motion = fit_to_images(folder, images, tracked, model, boundaries_s=times, progress=progress)
-            notes.append("the whole run was fitted at once to its images, with smooth accelerations and free falls")
+            motion, how = fit_to_images(folder, images, tracked, model, boundaries_s=times, progress=progress)
+            notes.append(how)
         root = smooth_root(motion, model, smoothing, times)
         joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
         write_smooth_motion(out / MOTION, root)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -63,21 +63,16 @@ class JudgedFit:
     fit: Fit
     agreement: MaskAgreement
     moved: tuple[int, ...] = ()  # first segments of the limbs that were found away from where they were expected
-    asked: tuple[int, ...] = ()  # first segments of the limbs that still ask for a search
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _MaskFaults:
-    """Where the mask of a pose and the images do not go together."""
+    """A fit, and where its mask and the images do not go together."""
 
+    fit: Fit
     misplaced: Sequence[NDArray[np.int64]]  # limbs that cover pixels unlike the body
     beside: Sequence[NDArray[np.int64]]  # limbs beside which more than a rim stands uncovered, in two views
     n_views_uncovered: int  # in which something like a limb stands out that the body does not cover
-
-    def limbs_asked(self, model: BodyModel) -> Sequence[NDArray[np.int64]]:
-        """Return the limbs that ask for a search, some of them twice: all of them, where anything stands out."""
-        anywhere = limbs_of(model) if self.n_views_uncovered >= _FEWEST_VIEWS else []
-        return [*self.misplaced, *self.beside, *anywhere]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,43 +133,25 @@ class Fitter:
         noise = min(each.noise for each in equations)
         return np.array([each.objective(noise, 0.0) for each in equations])
 
-    def judge(
-        self,
-        fit: Fit,
-        guesses: Sequence[Pose],
-        learned: LearnedRegions,
-        prior: PosePrior | None,
-        *,
-        waiting: Collection[int] = (),
-    ) -> JudgedFit:
-        """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it.
-
-        waiting: first segments of limbs that are not searched for, unless another one moves.
-        """
+    def judge(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> JudgedFit:
+        """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        found, faults = self._refit_limbs(fit, guesses, learned, prior, waiting=waiting)
-        limbs = limbs_of(self.model)
-        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, found.pose, limb) > DISTINCT_M]
-        return replace(self._assess(found, faults, learned), moved=_first_segments(moved))
+        faults, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
+        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, faults.fit.pose, limb) > DISTINCT_M]
+        return replace(self._assess(faults, learned), moved=tuple(int(limb[0]) for limb in moved))
 
     def assess(self, fit: Fit, learned: LearnedRegions) -> JudgedFit:
         """Judge a fit as it is."""
-        return self._assess(fit, self._find_faults(fit.pose, learned), learned)
+        return self._assess(self._find_faults(fit, learned), learned)
 
-    def limbs_asked(self, pose: Pose, learned: LearnedRegions) -> tuple[int, ...]:
-        """Return the first segments of the limbs that ask for a search in a pose; none without colours."""
-        if not self.moves_joints or not learned.masks.regions:
-            return ()
-        return _first_segments(self._find_faults(pose, learned).limbs_asked(self.model))
-
-    def _assess(self, fit: Fit, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
+    def _assess(self, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
+        fit = faults.fit
         segments = tuple(int(segment) for limb in faults.misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, fit.views, fit.equations.noise_of_views)
         for limb in faults.beside:  # it may be there: no better than one view
             n_views_of[limb] = np.minimum(n_views_of[limb], 1)
-        agreement = replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of)
-        return JudgedFit(fit, agreement, asked=_first_segments(faults.limbs_asked(self.model)))
+        return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of))
 
     def place_cost(self, fit: Fit, learned: LearnedRegions, misfit: float, prior: PosePrior | None) -> float:
         """Return minus the log-probability of a fit among others that have a limb elsewhere [nat].
@@ -190,32 +167,39 @@ class Fitter:
         return learned.image_views(self.render_model, bodies, are_narrow=not self.moves_joints)
 
     def _refit_limbs(
-        self,
-        fit: Fit,
-        guesses: Sequence[Pose],
-        learned: LearnedRegions,
-        prior: PosePrior | None,
-        *,
-        waiting: Collection[int],
-    ) -> tuple[Fit, _MaskFaults]:
+        self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
+    ) -> _MaskFaults:
         """Search for the limbs that cover what is unlike the body, or beside which, or anywhere, what is stands out.
 
-        None is searched for again before another has moved, nor one that has moved or, till then, waits. Before the
-        first, the whole body is fitted again.
+        None is searched for again before another has moved. Before the first, the whole body is fitted again.
         """
-        tried, moved, faults = set(waiting), set[int](), self._find_faults(fit.pose, learned)
-        if any(int(limb[0]) not in waiting for limb in (*faults.misplaced, *faults.beside)):
-            refitted, prior = self._refit_body(fit, learned, prior)
-            if refitted is not fit:
-                fit, faults = refitted, self._find_faults(refitted.pose, learned)
-        while asking := [limb for limb in faults.limbs_asked(self.model) if int(limb[0]) not in tried]:
-            limb = asking[0]
-            found, prior = self._refit_limb(fit, limb, guesses, learned, prior=prior)
+        tried = set[int]()
+
+        def search(
+            limb: NDArray[np.int64], faults: _MaskFaults, prior: PosePrior | None
+        ) -> tuple[_MaskFaults, PosePrior | None]:
+            if int(limb[0]) in tried:
+                return faults, prior
+            moved, prior = self._refit_limb(faults.fit, limb, guesses, learned, prior=prior)
+            if moved is not faults.fit:
+                tried.clear()
+                faults = self._find_faults(moved, learned)
             tried.add(int(limb[0]))
-            if found is not fit:
-                moved.add(int(limb[0]))
-                fit, faults, tried = found, self._find_faults(found.pose, learned), set(moved)
-        return fit, faults
+            return faults, prior
+
+        faults = self._find_faults(fit, learned)
+        if faults.misplaced or faults.beside:
+            refitted, prior = self._refit_body(fit, learned, prior)
+            faults = faults if refitted is fit else self._find_faults(refitted, learned)
+            for limb in faults.misplaced:
+                faults, prior = search(limb, faults, prior)
+            for limb in faults.beside:
+                faults, prior = search(limb, faults, prior)
+        for limb in limbs_of(self.model):
+            if faults.n_views_uncovered < _FEWEST_VIEWS:
+                break
+            faults, prior = search(limb, faults, prior)
+        return faults
 
     def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
         """Fit everything again, freer of what was expected; return the better fit, with its prior."""
@@ -272,20 +256,16 @@ class Fitter:
         best = int(np.argmin(costs))
         return (others[best], widened) if costs[best] < stays else (fit, prior)
 
-    def _find_faults(self, pose: Pose, learned: LearnedRegions) -> _MaskFaults:
+    def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
         model = self.render_model
-        misplaced = find_misplaced_limbs(model, pose, *learned.views)
-        pixels, beside_m2 = find_uncovered(model, model.with_pose(pose), *learned.views)
+        misplaced = find_misplaced_limbs(model, fit.pose, *learned.views)
+        pixels, beside_m2 = find_uncovered(model, model.with_pose(fit.pose), *learned.views)
         of_limb = ((limb, beside_m2[:, limb].sum(axis=1)) for limb in limbs_of(self.model))
         beside = [limb for limb, areas_m2 in of_limb if np.sum(areas_m2 > _BESIDE_M2) >= _FEWEST_VIEWS]
-        return _MaskFaults(misplaced, beside, sum(bool(each.any()) for each in pixels))
+        return _MaskFaults(fit, misplaced, beside, sum(bool(each.any()) for each in pixels))
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]
         if self.order == "joint" or not self.moves_joints:
             return [everything]
         return [trunk] * (reduction >= _TRUNK_AT) + [everything] * (reduction <= _TRUNK_AT)
-
-
-def _first_segments(limbs: Sequence[NDArray[np.int64]]) -> tuple[int, ...]:
-    return tuple(sorted({int(limb[0]) for limb in limbs}))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from airborne.appearance.model import Appearance
 from airborne.body import Pose
@@ -32,11 +32,10 @@ def fit_next(
     *,
     reference: Reference,
     prior: PosePrior | None,
-    waiting: Collection[int] = (),
 ) -> JudgedFit | None:
     """Fit from the first predicted pose that agrees with the images, or else from the one of most evidence.
 
-    waiting: first segments of limbs that are not searched for. None where no view shows any of the poses.
+    None where no view shows any of them.
     """
     learned = regions_near(fitter, predicted, frames, appearance)
     if not learned.masks.regions:
@@ -53,4 +52,4 @@ def fit_next(
     swaps = [pose for pose in fitter.swap_limbs(fit.pose) if is_nearer(fitter.model, pose, fit.pose, expected)]
     if swaps:
         fit = fitter.fit_images([fit.pose, *swaps], learned, prior)
-    return fitter.judge(fit, predicted, learned, prior, waiting=waiting)
+    return fitter.judge(fit, predicted, learned, prior)

@@ -20,13 +20,7 @@ from airborne.tracking.estimate import Estimate, Status, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
-from airborne.tracking.model_based.degrees_of_freedom import (
-    FIRST_POSE_SD,
-    WIDE_SD,
-    PosePrior,
-    joints_of,
-    limbs_of,
-)
+from airborne.tracking.model_based.degrees_of_freedom import FIRST_POSE_SD, WIDE_SD, PosePrior, joints_of, limbs_of
 from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, Order
@@ -48,8 +42,6 @@ _HISTORY = 3  # poses that predict
 # share of the reference's precision and recall from which colours and backgrounds are learned in turns; if they always
 # are, light that doubles within twelve frames is lost
 _STEADY = 0.98
-# a limb searched for in vain waits for such a frame: ten somersaults end as with 1, of four one is worse with 4
-_SEARCH_EVERY = 3
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 
 PREDICTIONS: dict[str, tuple[Callable[[predictors.PoseHistory, Fraction], Pose], ...]] = {
@@ -70,7 +62,6 @@ class RefinedState:
     reference: Reference = field(default_factory=Reference)
     covariance: Array | None = None  # of the last estimated pose
     n_learned: int = 0  # from how many frames was learned
-    asked: tuple[int, ...] = ()  # first segments of the limbs that asked for a search at last, in vain
 
 
 class RefinedTracker:
@@ -123,12 +114,10 @@ class RefinedTracker:
         if frames.index in self._keys and before:
             before = predictors.correct_past(before, frames.time_s, estimate.pose)
         past = (*before, (frames.time_s, estimate.pose))[-_HISTORY:]
+        if estimate.status is not Status.TRACKED and state.past:
+            return replace(state, past=past, covariance=estimate.covariance)
         posed = self.render_model.with_pose(estimate.pose)
         regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
-        if (asked := estimate.asked) is None:  # rows say nothing of it
-            asked = self._fitter.limbs_asked(estimate.pose, LearnedRegions.of(regions, state.appearance))
-        if estimate.status is not Status.TRACKED and state.past:
-            return replace(state, past=past, covariance=estimate.covariance, asked=asked)
         motion = self._motion(before, frames)
         shares = estimate.mask_shares or self._mask_shares(estimate.pose, regions, state.appearance)  # rows have none
         is_steady = bool(state.past) and state.reference.is_met(shares, _STEADY)
@@ -145,7 +134,7 @@ class RefinedTracker:
         if not state.past:  # nothing was known of colours before
             shares = self._mask_shares(estimate.pose, regions, appearance)
         reference = state.reference.update(*shares) if shares else state.reference
-        return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1, asked)
+        return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1)
 
     def _mask_shares(self, pose: Pose, regions: Sequence[Region], known: Appearance) -> tuple[float, float] | None:
         """Return precision and recall of a pose's mask; None where no region's colours have been learned."""
@@ -220,8 +209,7 @@ class RefinedTracker:
             predicted = [shrink_unobserved(last, pose, state.covariance) for pose in predicted]
         prior = self._prior_after(predicted[-1], gap_s)
         args = self._fitter, predicted, frames, state.appearance
-        waiting = [limb for limb in state.asked if frames.index % _SEARCH_EVERY != limb % _SEARCH_EVERY]
-        found = fit_next(*args, reference=state.reference, prior=prior, waiting=waiting)
+        found = fit_next(*args, reference=state.reference, prior=prior)
         if found is not None and not found.agreement.is_suspect(state.reference):
             return found
         suspect = None
@@ -282,7 +270,6 @@ class RefinedTracker:
             n_views=agreement.n_views,
             mask_shares=agreement.shares,
             moved=found.moved,
-            asked=found.asked,
         )
 
     def _prior_after(self, expected: Pose, gap_s: float) -> PosePrior | None:
