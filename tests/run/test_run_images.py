@@ -91,27 +91,28 @@ def errors_mm(scene, path):
     return 1e3 * float(np.mean(errors))
 
 
+def smooth_both(scene, folder, out):
+    """Smooth the run without and with its images; return both mean errors [mm] and how images were fitted."""
+    run, trial = folder / "run", folder / "trial" / "trial.toml"
+    assert in_process("smooth", run, "--events", "none", "-o", out / "plain") == 0
+    assert in_process("smooth", run, "--events", "none", "--images", trial, "-o", out / "images") == 0
+    plain, images = (errors_mm(scene, out / name / "tables/smooth_joints.csv") for name in ("plain", "images"))
+    return plain, images, json.loads((out / "images/smooth.json").read_text())["history"][0]
+
+
 def test_images_say_more_than_the_tracked_poses(scene, folder, tmp_path):
     before = contents_of(folder)
-    run, trial = folder / "run", folder / "trial" / "trial.toml"
-    assert in_process("smooth", run, "--events", "none", "-o", tmp_path / "plain") == 0
-    assert in_process("smooth", run, "--events", "none", "--images", trial, "-o", tmp_path / "images") == 0
-    plain, images = (errors_mm(scene, tmp_path / name / "tables/smooth_joints.csv") for name in ("plain", "images"))
+    plain, images, how = smooth_both(scene, folder, tmp_path)
     assert images < 0.6 * plain
-    how = json.loads((tmp_path / "images/smooth.json").read_text())["history"][0]
     assert "fitted at once to its images by the body's surface" in how
     assert contents_of(folder) == before
 
 
 def test_a_person_is_compared_in_a_skin(tmp_path):
     scene = scene_of("skin")
-    folder = run_of(scene, tmp_path / "skin")
-    run, trial = folder / "run", folder / "trial" / "trial.toml"
-    assert in_process("smooth", run, "--events", "none", "-o", tmp_path / "plain") == 0
-    assert in_process("smooth", run, "--events", "none", "--images", trial, "-o", tmp_path / "images") == 0
-    plain, images = (errors_mm(scene, tmp_path / name / "tables/smooth_joints.csv") for name in ("plain", "images"))
+    plain, images, how = smooth_both(scene, run_of(scene, tmp_path / "skin"), tmp_path)
     assert images < 0.6 * plain
-    assert "by a smooth skin" in json.loads((tmp_path / "images/smooth.json").read_text())["history"][0]
+    assert "by a smooth skin" in how
 
 
 def test_another_trial_and_another_method_are_refused(folder, capsys):

@@ -130,8 +130,8 @@ def compare_joints(
     """Compare a motion's landmarks with a reference, frame by frame, matched as in `compare_motion`.
 
     A marker is matched with the landmark of its name, or else that of `landmark_of`. With `smooth`, the motion's
-    landmarks as they were smoothed take the places of its own, and their deviations. Raises
-    ResultError if no marker has a landmark, no frame with a pose has a reference, or `smooth` is not of the motion.
+    landmarks as they were smoothed take the places of its own, and their deviations. Raises ResultError if no marker
+    has a landmark, no frame with a pose has a reference, or `smooth` is not of the motion.
     """
     marker_columns, not_compared = _match_markers(model, reference)
     columns = [k for k, mark in enumerate(model.landmarks) if mark.name in marker_columns]
@@ -148,9 +148,10 @@ def compare_joints(
     points, all_sd = landmarks(motion, model)
     joint_status = joint_statuses(motion, model, all_sd)[:, columns]
     measured, sd = points[:, columns], all_sd[:, columns]
-    sd_by_frame = landmarks(replace(motion, lasting=None), model)[1][:, columns]
-    if smooth is not None:
-        measured, sd = _smoothed(motion, smooth, names)
+    if smooth is None:
+        sd_by_frame = landmarks(replace(motion, lasting=None), model)[1][:, columns]
+    else:
+        measured, sd = _match_smooth(motion, smooth, names)
         sd_by_frame = np.full(sd.shape, np.nan)  # they are not told apart
     R = _rotations(motion, model, columns)
     frames, rows = frames[has_pose], rows[has_pose]
@@ -189,7 +190,7 @@ def compare_joints(
     )
 
 
-def _smoothed(motion: Motion, smooth: JointPaths, names: list[str]) -> tuple[Array, Array]:
+def _match_smooth(motion: Motion, smooth: JointPaths, names: list[str]) -> tuple[Array, Array]:
     """Return the smoothed landmarks of these names in the motion's frames, and their sds: (n, l, 3), (n, l) [m]."""
     if len(smooth.time_s) != len(motion) or np.any(smooth.time_s != motion.time_s) or not set(names) <= {*smooth.names}:
         raise ResultError("the smoothed joints are of another run; `airborne smooth` this one again")

@@ -84,7 +84,8 @@ class _RunImages:
         start, known, reader = estimates[0].pose, trial.settings, Rereading(open_trial(trial).recording)
         assert start is not None
         model = sample_body_colours(model, start, next(reader.forward(estimates[0].index, None)))
-        tracker = tracker_of(Settings(lights=known.lights, is_light_exact=known.is_light_exact), model, start)
+        settings = Settings(lights=known.lights, is_light_exact=known.is_light_exact)
+        tracker = tracker_of(settings, model, start)
         images = cls(reader, tracker, estimates, progress, tracker.init())
         tracked = [each.index for each in estimates if each.status is Status.TRACKED]
         fitted = {tracked[k] for k in np.linspace(0, len(tracked) - 1, N_FRAMES).astype(int)} if tracked else set()
@@ -94,7 +95,7 @@ class _RunImages:
             if estimate.index in fitted and estimate.pose is not None:
                 found.append((frames, estimate.pose))
         skin = fit_skin(model, found)
-        images.skin = None if skin is None else RenderModel.of(skin, known.lights if known.is_light_exact else None)
+        images.skin = None if skin is None else RenderModel.of(skin, settings.exact_lights)
         return images
 
     def look(self, poses: Sequence[Pose]) -> list[ImageEvidence]:

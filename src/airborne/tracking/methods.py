@@ -57,6 +57,11 @@ class Settings:
     is_light_exact: bool = False  # else only stepping and simplex use `lights`; the others fit the light
     fixed_shape: bool = False  # joints stay as they are at the start; stepping and simplex never move them
 
+    @property
+    def exact_lights(self) -> Lights | None:
+        """The lights by which images are drawn; None where the light is fitted."""
+        return self.lights if self.is_light_exact else None
+
 
 def tracker_of(
     settings: Settings, model: BodyModel, start: Pose, keys: Mapping[int, PoseEvidence] | None = None
@@ -71,7 +76,7 @@ def _tracker_of(settings: Settings, model: BodyModel, start: Pose, keys: Mapping
             model,
             start,
             prediction=settings.prediction,
-            lights=settings.lights if settings.is_light_exact else None,
+            lights=settings.exact_lights,
             order=settings.method,
             fixed_shape=settings.fixed_shape,
             keys=keys,

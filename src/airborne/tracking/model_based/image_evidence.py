@@ -37,11 +37,11 @@ class ImageEvidence:
 
 def image_evidence(
     render_model: RenderModel,
-    model: BodyModel,
     pose: Pose,
     frames: Frames,
     appearance: Appearance,
     *,
+    model: BodyModel,
     misfit: float | None = None,
 ) -> ImageEvidence:
     """Linearise the images about a pose; misfit: None where they are weighed by that which they show there.

@@ -161,8 +161,8 @@ class RefinedTracker:
         surface: RenderModel | None = None,
     ) -> ImageEvidence:
         """Return what the images say about a pose of the body, or of another surface of it; see `image_evidence`."""
-        args = pose, self.reduce_frames(frames), state.appearance
-        return image_evidence(surface or self.render_model, self._fitter.model, *args, misfit=misfit)
+        args = surface or self.render_model, pose, self.reduce_frames(frames), state.appearance
+        return image_evidence(*args, model=self._fitter.model, misfit=misfit)
 
     def revise(self, records: Sequence[FrameRecord], state: RefinedState) -> dict[int, Estimate]:
         """Return better estimates of earlier records, where limbs that the newest moved have been by then."""
