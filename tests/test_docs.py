@@ -24,9 +24,9 @@ from airborne.evaluation.players import PartErrors
 from airborne.export.figures import write_figures
 from airborne.motion import covariance_file, flight_summary
 from airborne.motion.files import _header
-from airborne.motion.run_folder import SMOOTH_JOINTS, SMOOTH_RECORD, figures_of
+from airborne.motion.run_folder import SMOOTH_JOINTS, SMOOTH_RECORD, TABLES, TRACKED_MOTION, figures_of
 from airborne.run import smooth
-from airborne.run.body import write_tables
+from airborne.run.body_tables import write_tables
 from airborne.run.evaluate import assess
 from airborne.run.own_body import PICTURE
 from airborne.run.track import track_trial
@@ -303,7 +303,8 @@ def person(tmp_path_factory):
 def test_every_file_of_a_body_with_joints_is_documented(person, run):
     left = set(files_of(person[0])) - set(files_of(run))
     rows = table_of(RESULTS, "Files of a body with joints")
-    assert left | {covariance_file.COVARIANCE_FILE} == {name for row in rows for name in named(row[0])}
+    covariances = {covariance_file.COVARIANCE_FILE, f"{TABLES}/{covariance_file.COVARIANCE_FILE}"}
+    assert left | covariances | {TRACKED_MOTION} == {name for row in rows for name in named(row[0])}
 
 
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])

@@ -1,8 +1,8 @@
 """Errors of smoothed somersaults: `python benchmarks/accuracy/smoothing.py [SOMERSAULT ...] [--runs FOLDER]`.
 
 Two synthetic somersaults, which no constant was chosen on, and recorded ones whose folders are given are tracked and
-smoothed by the Kalman smoother, as tracked and after the whole run was fitted to its images (about 3 minutes of CPU
-each); runs that lie in FOLDER already are taken as they are.
+smoothed by the Kalman smoother, from the poses frame by frame and from those of the fit of the whole run (about a
+minute of CPU each); runs that lie in FOLDER already are taken as they are.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import argparse
 import csv
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +23,9 @@ from rows import append
 
 from airborne.body import BodyModel
 from airborne.motion import Motion, landmarks
-from airborne.motion.run_folder import read_body_run
+from airborne.motion.files import read_motion
+from airborne.motion.run_folder import TRACKED_MOTION, read_body_run
 from airborne.motion.smoothing.smoother import Smoothing, smooth_landmarks, smooth_root
-from airborne.run.run_images import fit_to_images
 from airborne.run.track import track_trial
 from airborne.synthetic import write_somersault
 from airborne.synthetic.flight.somersault import SomersaultPreset
@@ -39,7 +39,8 @@ _KALMAN = Smoothing(method="kalman")
 
 def measure(name: str, folder: Path, run: Path) -> list[dict]:
     """Return the rows of one run: errors of the smoothed motions against those of the tracked one."""
-    motion, model = read_body_run(run)
+    fitted, model = read_body_run(run)
+    motion = replace(read_motion(run / TRACKED_MOTION), lasting=fitted.lasting)
     truth = _Truth(model, true_joints(folder, motion.time_s, [each.name for each in model.landmarks]))
     points, true_w = landmarks(motion, model)[0], _true_rates(folder, motion.time_s)
     tracked_mm, tracked_w = truth.mean_mm(motion, points), _rms(_rates(motion.time_s, motion.R) - true_w)
@@ -49,8 +50,7 @@ def measure(name: str, folder: Path, run: Path) -> list[dict]:
         {**common, "method": "tracked", "metric": "without offset", "unit": "mm", "value": tracked_mm[1]},
         {**common, "method": "tracked", "metric": "angular velocity, RMS", "unit": "rad/s", "value": tracked_w},
     ]
-    fitted, _ = fit_to_images(run, read_trial(folder / "trial.toml"), motion, model)
-    for method, each in {"kalman": motion, "images, kalman": fitted}.items():
+    for method, each in {"kalman": motion, "whole run, kalman": fitted}.items():
         joints, root = smooth_landmarks(each, model, _KALMAN, []), smooth_root(each, model, _KALMAN, [])
         smooth, sd = (joints[key].to_numpy()[:, : len(model.landmarks)] for key in ("position", "position_sd"))
         w, w_sd = root["angular_velocity"].to_numpy(), root["angular_velocity_sd"].to_numpy()[:, None]

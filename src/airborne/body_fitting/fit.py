@@ -57,6 +57,7 @@ class BodyObservation:
 
     frames: Frames
     landmarks: Mapping[str, Array]  # landmark -> (3,) world [m]; NaN where unknown
+    pose: Pose | None = None  # near by, where one is known
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +142,7 @@ def fit_body(
     lengths = {} if girths_alone else measure_lengths(model, [each.landmarks for each in observations])
     start = with_segment_lengths(model, lengths)
     all_times = (*observations, *scenery)
-    initial = tuple(_pose_from_landmarks(start, each, weights) for each in observations)
+    initial = tuple(_pose_from_landmarks(start, each, weights, each.pose) for each in observations)
     for each in scenery:
         nearest = min(range(len(observations)), key=lambda i: abs(observations[i].frames.index - each.frames.index))
         initial += (_pose_from_landmarks(start, each, weights, initial[nearest]),)

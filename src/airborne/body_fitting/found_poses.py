@@ -22,7 +22,7 @@ def fit_found(
     """Fit a body to frames and the pose found in each; see `fit_body`, which raises BodyError."""
     names = [mark.name for mark in model.landmarks]
     observations = [
-        BodyObservation(frames, dict(zip(names, model.with_pose(pose).landmarks, strict=True)))
+        BodyObservation(frames, dict(zip(names, model.with_pose(pose).landmarks, strict=True)), pose)
         for frames, pose in found
     ]
     return fit_body(

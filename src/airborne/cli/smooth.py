@@ -24,10 +24,6 @@ def smooth_command(
     ] = None,
     spline: Annotated[bool, typer.Option("--spline", help="Smoothing splines by cross-validation.")] = False,
     kalman: Annotated[bool, typer.Option("--kalman", help="Kalman smoother with the run's own covariances.")] = False,
-    images: Annotated[
-        Path | None,
-        typer.Option(help="The run's trial file: before, fit the whole run of a person at once to its videos again."),
-    ] = None,
     fill: Annotated[float, typer.Option(help="Fill gaps up to so many seconds.")] = 0.0,
     events: Annotated[
         str,
@@ -41,22 +37,19 @@ def smooth_command(
 ) -> None:
     """Smooth a run and compute velocities and accelerations: new tables beside the raw ones.
 
-    Without --butterworth, --spline or --kalman the Kalman smoother, which uses the run's own covariances. With --images
-    it gets better poses from the videos.
+    Without --butterworth, --spline or --kalman the Kalman smoother, which uses the run's own covariances.
 
-    Example: airborne smooth results --images trial.toml
+    Example: airborne smooth results
     """
     from airborne.export.summary import json_ready
     from airborne.run.smooth import smooth_run
-    from airborne.trial.file import read_trial
 
     note = ""
     if butterworth is None and not (spline or kalman):
         kalman, note = True, "smoothed with --kalman and the run's own covariances: no method was chosen"
     settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
-        trial = None if images is None else read_trial(images)
-        done = smooth_run(results, settings, events_s=_times(events), images=trial, out=output, progress=report)
+        done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)
     if note:
         errors.print(note, markup=False)
     print(json.dumps(json_ready(done.to_dict())) if as_json else done.describe())

@@ -139,6 +139,7 @@ def _track(
                 take=take,
                 progress=partial(report, f"tracking {trial.name}"),
                 find_progress=partial(report, "looking for the start"),
+                fit_progress=partial(report, "fitting the whole run"),
             )
     except KeyboardInterrupt:
         if not any((output / table).is_file() for table in _FIRST_WRITTEN):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -56,3 +57,31 @@ class BandedEquations:
             for i, block in enumerate(blocks):
                 band[below[is_kept], i * d + column[is_kept]] = block[is_kept]
         return np.asarray(solveh_banded(band, self.right.ravel(), lower=True, overwrite_ab=True)).reshape(n, d)
+
+    def covariances(self) -> Array:
+        """Return the diagonal blocks of the inverse of A, each time's marginal covariance: (n, d, d).
+
+        By a forward and a backward recursion over pairs of times, whose matrix is block tridiagonal (Takahashi 1973).
+        """
+        n, d = self.right.shape
+        pairs = [range(i, min(i + 2, n)) for i in range(0, n, 2)]
+        below = [self._join(later, former) for former, later in pairwise(pairs)]
+        inverses = [np.linalg.inv(self._join(pairs[0], pairs[0]))]
+        for pair, rows in zip(pairs[1:], below, strict=True):
+            inverses.append(np.linalg.inv(self._join(pair, pair) - rows @ inverses[-1] @ rows.T))
+        covariance, found = inverses[-1], [inverses[-1]]
+        for inverse, rows in zip(inverses[-2::-1], below[::-1], strict=True):
+            gain = inverse @ rows.T
+            covariance = inverse + gain @ covariance @ gain.T
+            found.append(covariance)
+        diagonal = [each[j : j + d, j : j + d] for each in found[::-1] for j in range(0, len(each), d)]
+        return np.array(diagonal)
+
+    def _join(self, rows: range, columns: range) -> Array:
+        """Return the part of A of some times, rows and columns."""
+        return np.block([[self._block(i, j) for j in columns] for i in rows])
+
+    def _block(self, i: int, j: int) -> Array:
+        if i < j:
+            return self._block(j, i).T
+        return self.blocks[i - j][j] if i - j <= 2 else np.zeros_like(self.blocks[0][0])

@@ -181,7 +181,6 @@ def smooth(
     fill_s: float = 0.0,
     resample_hz: float | None = None,
     events_s: Sequence[float] | None = None,
-    images: Trial | FilePath | None = None,
     output: FilePath | None = None,
     progress: bool | Progress = False,
 ) -> SmoothRun:
@@ -189,8 +188,7 @@ def smooth(
 
     Without a method by the Kalman smoother, as `airborne smooth` does, or with a cut-off by a Butterworth filter. That
     filter without a cut-off gets the one of the residual analysis; gaps up to `fill_s` [s] are filled;
-    `events_s` are the times [s] that no filter crosses, None those that are found. With `images`, the run's trial, the
-    whole run of a person is fitted at once to its videos before the Kalman smoother. Raises ResultError for what cannot
+    `events_s` are the times [s] that no filter crosses, None those that are found. Raises ResultError for what cannot
     be smoothed so.
 
     >>> smooth("results", cutoff_hz=10, events_s=[]).tables["joints"]["velocity"].attrs["units"]
@@ -200,9 +198,8 @@ def smooth(
     require_choice(method, _SMOOTHINGS, "method")
     settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
     out = None if output is None else Path(output)
-    trial = images if images is None or isinstance(images, Trial) else read_trial(images)
     with _reporting(progress, "smoothing") as report:
-        return smooth_run(_folder(run), settings, events_s=events_s, images=trial, out=out, progress=report)
+        return smooth_run(_folder(run), settings, events_s=events_s, out=out, progress=report)
 
 
 def export_run(

@@ -47,9 +47,11 @@ class CovarianceWriter:
 
 
 def write_covariances(path: Path, covariances: Array) -> None:
-    """Write covariances (n, size, size) at once."""
+    """Write covariances (n, size, size) at once; a file that is there stays whole until they are."""
     rows, columns = np.triu_indices(covariances.shape[-1])
-    path.write_bytes(covariances[:, rows, columns].astype(_FLOAT).tobytes())
+    unfinished = path.with_name(path.name + ".part")
+    unfinished.write_bytes(covariances[:, rows, columns].astype(_FLOAT).tobytes())
+    unfinished.replace(path)
 
 
 def read_covariances(path: Path, n: int, *, size: int, first: int = 0) -> Array:

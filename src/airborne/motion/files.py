@@ -9,7 +9,8 @@ import csv
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -33,6 +34,7 @@ from airborne.tracking import Estimate, Status
 
 _UPPER = np.triu_indices(6)  # of the covariance of position and rotation
 _COVARIANCE = [f"cov_{i}{j}" for i, j in zip(*_UPPER, strict=True)]
+_TIME = "time_exact"
 _ROTATION = [f"r{i}{j}" for i in range(3) for j in range(3)]
 
 
@@ -76,12 +78,10 @@ class MotionWriter:
     def append(self, estimate: Estimate) -> None:
         """Write one frame and wait until it is on disk."""
         motion = Motion.collect([estimate], self._joints)
-        public = [cell(column[0]) for column in motion_columns(motion).values()]
-        covariance = map(cell, motion.covariance[0][_UPPER])
         if self._covariances is not None:
             self._covariances.append(motion.covariance[0])
-        pose = map(cell, [*motion.R[0].ravel(), *motion.joint_angles[0].ravel()])
-        self._write_line([*public, *covariance, str(estimate.time_s), *pose])
+        (cells,) = _cells(motion, [str(estimate.time_s)])
+        self._write_line(cells)
 
     def _write_line(self, cells: list[str]) -> None:
         with explain_full_disk(self._path):
@@ -109,20 +109,35 @@ def read_motion(path: Path) -> Motion:
 
 
 def revise_motion(path: Path, motion: Motion) -> None:
-    """Write what the end of a run says of all of it: lasting errors beside motion.csv, and its sds and statuses anew.
+    """Write a run's motion as its end leaves it, in the place of that which was written frame by frame.
 
-    The covariances of the moments' own errors stay as they are.
+    The motion is of the same frames, in the order of the rows. Lasting errors go beside motion.csv.
     """
     header, *rows = path.read_text(encoding="utf-8").splitlines()
-    columns, lines = motion_columns(motion).values(), [header]
-    for row, line in enumerate(rows):
-        public = [cell(column[row]) for column in columns]
-        lines.append(",".join([*public, *line.split(",")[len(public) :]]))
+    exact = header.split(",").index(_TIME)
+    lines = [header, *map(",".join, _cells(motion, [line.split(",")[exact] for line in rows]))]
     if motion.lasting is not None:
         write_covariances(path.with_name(LASTING_FILE), motion.lasting)
     unfinished = path.with_name(path.name + ".part")
     unfinished.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    if motion.joints:
+        write_covariances(path.with_name(COVARIANCE_FILE), motion.covariance)
     unfinished.replace(path)
+
+
+def copy_motion(path: Path, to: Path) -> None:
+    """Copy a motion.csv with its covariance.bin; only after all of them is the copy there."""
+    covariance, unfinished = path.with_name(COVARIANCE_FILE), to.with_name(to.name + ".part")
+    if covariance.is_file():
+        shutil.copyfile(covariance, to.with_name(COVARIANCE_FILE))
+    shutil.copyfile(path, unfinished)
+    unfinished.replace(to)
+
+
+def remove_motion(path: Path) -> None:
+    """Remove a motion.csv with its covariance.bin."""
+    for each in (path, path.with_name(COVARIANCE_FILE)):
+        each.unlink(missing_ok=True)
 
 
 def drop_rows(path: Path, is_dropped: Callable[[int], bool]) -> None:
@@ -149,9 +164,19 @@ def _rewrite(path: Path, rows: Sequence[int]) -> None:
     unfinished.replace(path)
 
 
+def _cells(motion: Motion, exact_times: Sequence[str]) -> Iterator[list[str]]:
+    """Yield the cells of each row of motion.csv."""
+    columns = list(motion_columns(motion).values())
+    for row, time in enumerate(exact_times):
+        covariance, R, angles = (each[row] for each in (motion.covariance, motion.R, motion.joint_angles))
+        numbers = covariance[_UPPER], R.ravel(), angles.ravel()
+        upper, rotation, joints = (list(map(cell, each)) for each in numbers)
+        yield [*(cell(column[row]) for column in columns), *upper, time, *rotation, *joints]
+
+
 def _header(joints: tuple[str, ...]) -> list[str]:
     angles = [f"{joint}_{axis}_rad" for joint in joints for axis in "xyz"]
-    return [*motion_columns(Motion.collect([])), *_COVARIANCE, "time_exact", *_ROTATION, *angles]
+    return [*motion_columns(Motion.collect([])), *_COVARIANCE, _TIME, *_ROTATION, *angles]
 
 
 def _whole_lines(path: Path) -> bytes:
@@ -231,7 +256,7 @@ def _estimate(row: dict[str, str], n_joints: int, full: NDArray[np.float64] | No
         pose = Pose(world_from_root=rigid_transform(R, position), joint_angles=angles)
     return Estimate(
         index=_whole_number(row["frame"]),
-        time_s=_exact_fraction(row["time_exact"]),
+        time_s=_exact_fraction(row[_TIME]),
         status=status,
         score=_number(row["score"]),
         pose=pose,

@@ -23,6 +23,7 @@ CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a sta
 PICTURES = "pictures.json"  # beside the videos: some of their pictures
 FOLDERS = TABLES, FIGURES, VIDEOS = "tables", "figures", "videos"
 ANGLES, JOINT_ANGLES, FLIGHT = (f"{TABLES}/{name}.csv" for name in ("angles", "joint_angles", "flight"))
+TRACKED_MOTION = f"{TABLES}/tracked_motion.csv"  # before the fit of a whole run, as it was tracked
 SMOOTH_JOINTS = f"{TABLES}/smooth_joints.csv"
 _COUNTS = {"name", "n_frames", "n_tracked", "n_uncertain", "n_lost"}  # that every summary holds
 _TELLING = ("matching.png", "heights.png", "through_mask.png", "pose.png")  # figures that tell most of a run

@@ -4,53 +4,47 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
+from airborne.body import BodyModel, Pose
 from airborne.body.files import mesh_files, write_body
 from airborne.body_fitting.first_frames import EVERY, N_FRAMES, fit_preset
 from airborne.body_fitting.landmark_places import place_landmarks
 from airborne.calibration.from_points import Calibration
-from airborne.cameras import Camera
 from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import (
     Motion,
     MotionWriter,
     flight_summary,
-    has_inertias,
     read_estimates,
     read_motion,
     revise_motion,
     sort_rows,
-    write_angles,
-    write_flight,
-    write_joint_angles,
-    write_joints,
-    write_motion_parquet,
 )
+from airborne.motion.files import copy_motion
 from airborne.motion.run_folder import (
-    ANGLES,
     BODY,
-    FLIGHT,
-    JOINT_ANGLES,
-    JOINTS,
     MOTION,
+    TRACKED_MOTION,
     figures_of,
     tables_of,
     videos_of,
 )
 from airborne.motion.tables import write_uncertainty
-from airborne.rendering import FLAT, render
+from airborne.run.body_tables import has_flight, write_tables
+from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart
-from airborne.run.first_pose import find_first_pose
+from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, is_seen
 from airborne.run.keys import keys_of_frames
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
+from airborne.run.whole_run import FittedRun, fit_whole_run
 from airborne.tracking import Estimate
 from airborne.tracking.both_directions import track_between_keys
 from airborne.tracking.estimate import Status, unknown_segments
@@ -60,7 +54,8 @@ from airborne.tracking.revision import track_with_revision
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
-from airborne.types import Array
+from airborne.trial.settings import BodySettings
+from airborne.types import Array, Progress
 from airborne.video import Frames, Recording
 from airborne.video.rereading import Rereading
 
@@ -70,7 +65,6 @@ _UNCERTAINTY = (
     "times. They do not include wrong lengths and girths of single segments."
 )
 _CALIBRATION_UNCERTAINTY = " They include a shift of each camera's whole image due to calibration."
-OUT_OF_SIGHT = "the start pose lies in no camera's image; check start.position_m, in metres"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,8 +187,11 @@ class BodyRun:
         """Write one time's estimate."""
         writer.append(estimate)
 
-    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
-        """Return what draws the frames while they are tracked."""
+    def artists(self, folder: Path, drawn: OverlaysAs) -> Iterable[AbstractContextManager[Any]]:
+        """Return what draws the frames while they are tracked; nothing where poses change at the end of the run."""
+        return () if drawn == "videos" and self._fits_whole_run else self._all_artists(folder, drawn)
+
+    def _all_artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         from airborne.export.matching import MatchingPicture
         from airborne.export.sheet import ContactSheet
 
@@ -218,8 +215,15 @@ class BodyRun:
         """Keep some frames, spread over the run, for the self-check."""
         self.kept.add(frames)
 
-    def finish(self, folder: Path) -> tuple[Motion, dict[str, Any]]:
-        """Check the run and write the tables; return the motion and the beginning of the summary."""
+    @property
+    def _fits_whole_run(self) -> bool:
+        settings = self.trial.track
+        return isinstance(settings, BodySettings) and settings.fits_whole_run and self.model.has_joints
+
+    def finish(
+        self, folder: Path, drawn: OverlaysAs | None, progress: Progress | None
+    ) -> tuple[Motion, dict[str, Any]]:
+        """Check the run, fit it and write the tables; return the motion and the beginning of the summary."""
         sort_rows(folder / self.table)
         motion, model = read_motion(folder / self.table), self.model
         checked = check_run(
@@ -231,20 +235,44 @@ class BodyRun:
             self.calibration,
             is_preset=self.trial.body.file is None,
         )
-        motion = checked.motion
+        fitted = self._fit_whole_run(folder, checked.motion, progress) if self._fits_whole_run else None
+        motion = checked.motion if fitted is None else fitted.motion
         revise_motion(folder / self.table, motion)
         if checked.found is not None:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
         write_tables(folder, motion, model)
+        if drawn == "videos" and self._fits_whole_run:
+            self._draw_again(folder, drawn)
         self.recording.events.extend(checked.doubts)
         is_exact = self.calibration is None
         return motion, {
             "name": self.trial.name,
             **headline(motion),
-            **({"flight": flight_summary(motion, model).to_dict()} if _has_flight(motion, model) else {}),
+            **({"flight": flight_summary(motion, model).to_dict()} if has_flight(motion, model) else {}),
+            **({} if fitted is None else {"whole_run": fitted.surface}),
             "self_check": checked.findings,
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
         }
+
+    def _fit_whole_run(self, folder: Path, motion: Motion, progress: Progress | None) -> FittedRun | None:
+        """Fit the whole run; what the tracker found stays beside it, for a run that is resumed and for a comparison."""
+        estimates, reader = read_estimates(folder / self.table), Rereading(self.recording)
+        args = reader, self.trial.settings, self.model, motion, estimates
+        fitted = fit_whole_run(*args, keys=self.keys, progress=progress)
+        if fitted is not None:
+            tables_of(folder)
+            copy_motion(folder / self.table, folder / TRACKED_MOTION)
+        return fitted
+
+    def _draw_again(self, folder: Path, drawn: OverlaysAs) -> None:
+        """Draw every time with the estimate that the run ended with."""
+        estimates = {estimate.index: estimate for estimate in read_estimates(folder / self.table)}
+        with ExitStack() as stack:
+            artists = [stack.enter_context(artist) for artist in self._all_artists(folder, drawn)]
+            drawing = stack.enter_context(DrawingThread(partial(self.draw, artists)))
+            for frames in Rereading(self.recording).forward(min(estimates), max(estimates) + 1):
+                if frames.index in estimates:
+                    drawing.put(frames, estimates[frames.index])
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
         """Draw the figures and write the report."""
@@ -260,25 +288,3 @@ class BodyRun:
     def warnings(self) -> list[str]:
         """Return what a reader of the numbers must know beside the uncertainty."""
         return []
-
-
-def write_tables(folder: Path, motion: Motion, model: BodyModel) -> None:
-    """Write what is made of a motion: the same as parquet, angles, joints, the flight."""
-    tables = tables_of(folder)
-    write_joints(folder / JOINTS, motion, model)
-    write_motion_parquet(tables / "motion.parquet", motion)
-    write_angles(folder / ANGLES, motion)
-    if motion.joints:
-        write_joint_angles(folder / JOINT_ANGLES, motion, model)
-    if _has_flight(motion, model):
-        write_flight(folder / FLIGHT, motion, model)
-
-
-def _has_flight(motion: Motion, model: BodyModel) -> bool:
-    return bool(motion.joints) and has_inertias(model)
-
-
-def is_seen(posed: PosedBody, cameras: Iterable[Camera]) -> bool:
-    """Say whether any part of a body lies in a camera's image; lens distortion is left out."""
-    surface = surface_arrays(posed.model)
-    return any(render(surface, posed, camera.without_distortion(), FLAT).mask.any() for camera in cameras)

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from airborne.errors import AirborneError, MistakesError, TrialError, count
-from airborne.run.body import OUT_OF_SIGHT, is_seen
 from airborne.run.detections import read_trial_detections
-from airborne.run.first_pose import find_first_pose
+from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, is_seen
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
 from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source

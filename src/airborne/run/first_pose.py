@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from airborne.body import BodyModel
-from airborne.cameras import Rig
+from airborne.body import BodyModel, PosedBody, surface_arrays
+from airborne.cameras import Camera, Rig
 from airborne.errors import TrialError
+from airborne.rendering import FLAT, render
 from airborne.run.detections import TrialDetections
 from airborne.run.keys import read_key
 from airborne.run.landmarks import read_joint_positions, read_pixels
@@ -18,6 +19,8 @@ from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.model_based.degrees_of_freedom import FIRST_POSE_SD
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
+
+OUT_OF_SIGHT = "the start pose lies in no camera's image; check start.position_m, in metres"
 
 
 def find_first_pose(trial: Trial, model: BodyModel, rig: Rig, detections: TrialDetections | None) -> FirstPose:
@@ -50,3 +53,9 @@ def _add_lone_clicks(trial: Trial, model: BodyModel, rig: Rig, first: FirstPose,
     sds = np.repeat(FIRST_POSE_SD, [3, 3, 3 * model.n_joints])
     note = f"start.points_px: {', '.join(names)} clicked in one camera: placed across its line of sight alone"
     return replace(first, pose=join_evidence(first.pose, sds, evidence), notes=(*first.notes, note))
+
+
+def is_seen(posed: PosedBody, cameras: Iterable[Camera]) -> bool:
+    """Say whether any part of a body lies in a camera's image; lens distortion is left out."""
+    surface = surface_arrays(posed.model)
+    return any(render(surface, posed, camera.without_distortion(), FLAT).mask.any() for camera in cameras)

@@ -20,6 +20,7 @@ from airborne.io.files import file_digest
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
 from airborne.motion import drop_rows
 from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
+from airborne.motion.files import copy_motion, remove_motion
 from airborne.motion.run_folder import (
     BODY,
     CALIBRATION,
@@ -33,6 +34,7 @@ from airborne.motion.run_folder import (
     RUN_RECORD,
     SMOOTH_RECORD,
     SUMMARY,
+    TRACKED_MOTION,
     read_record,
 )
 from airborne.trial.file import Trial
@@ -75,6 +77,9 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
+    if table == MOTION and (folder / TRACKED_MOTION).is_file():  # a run goes on from what was tracked
+        copy_motion(folder / TRACKED_MOTION, rows)
+        remove_motion(folder / TRACKED_MOTION)
     recorded = _with_keys(read_record(record), identity)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
     if table == MOTION and changed and set(changed) <= {"keys", "masks"}:

@@ -24,6 +24,7 @@ from airborne.tracking.players import PlayersStep, PlayerStart, PlayersTracker, 
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.trial.settings import BodySettings
+from airborne.types import Progress
 from airborne.video import Frames, LiveRecording, Recording
 
 _UNCERTAINTY = (
@@ -111,7 +112,9 @@ class PlayersRun:
         for artist in artists:
             artist.write(frames, self.players.joints, estimate.players)
 
-    def finish(self, folder: Path) -> tuple[PlayersMotion, dict[str, Any]]:
+    def finish(
+        self, folder: Path, drawn: OverlaysAs | None, progress: Progress | None
+    ) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
         motion = read_players(folder / self.table)
         write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)

@@ -41,8 +41,6 @@ from airborne.motion.smoothing.tables import (
     write_smooth_motion,
 )
 from airborne.run.folder import open_results
-from airborne.run.run_images import fit_to_images
-from airborne.trial.file import Trial
 from airborne.types import Array, Progress
 
 Events = dict[str, tuple[Event, ...]]  # by player; of one body under ""
@@ -108,20 +106,16 @@ def smooth_run(
     smoothing: Smoothing,
     *,
     events_s: Sequence[float] | None = None,
-    images: Trial | None = None,
     out: Path | None = None,
     progress: Progress | None = None,
 ) -> SmoothRun:
     """Smooth the run in a folder, and write new tables and residuals.png there, or into `out`; raw tables stay.
 
     A Butterworth filter without a cut-off gets that of the residual analysis. `events_s` are the times at which
-    segments end, for every player; None takes the take-offs and landings that the motion shows. `images`, the run's
-    trial, is for the Kalman smoother of a body with joints: the whole run is fitted at once to its images before
-    (`fit_to_images`). Raises ResultError where the folder holds no run, and for what cannot be smoothed so.
+    segments end, for every player; None takes the take-offs and landings that the motion shows. Raises ResultError
+    where the folder holds no run, and for what cannot be smoothed so.
     """
-    if images is not None and (smoothing.method != "kalman" or holds_players(folder)):
-        raise ResultError("images are for the Kalman smoother of one body's run; leave them out, or the other method")
-    run = _players_run(folder) if holds_players(folder) else _body_run(folder, images)
+    run = _players_run(folder) if holds_players(folder) else _body_run(folder)
     events = _events(run, events_s)
     boundaries = {name: [event.time_s for event in each] for name, each in events.items()}
     analysis = None
@@ -177,16 +171,13 @@ def _players_run(folder: Path) -> _Run:
     return _Run(motion.time_s, paths, owners, lambda: player_events(motion), write)
 
 
-def _body_run(folder: Path, images: Trial | None) -> _Run:
-    tracked, model = read_body_run(folder)
+def _body_run(folder: Path) -> _Run:
+    motion, model = read_body_run(folder)
 
     def write(
         out: Path, smoothing: Smoothing, events: Events, progress: Progress | None
     ) -> tuple[dict[str, xr.Dataset], tuple[str, ...]]:
-        times, motion, notes = [event.time_s for event in events[""]], tracked, list[str]()
-        if images is not None:
-            motion, how = fit_to_images(folder, images, tracked, model, boundaries_s=times, progress=progress)
-            notes.append(how)
+        times = [event.time_s for event in events[""]]
         root = smooth_root(motion, model, smoothing, times)
         joints = smooth_landmarks(motion, model, smoothing, times, progress=progress)
         write_smooth_motion(out / MOTION, root)
@@ -197,12 +188,10 @@ def _body_run(folder: Path, images: Trial | None) -> _Run:
             tables["angles"] = smooth_joint_angles(motion, model, smoothing, times)
             write_smooth_joint_angles(out / ANGLES, tables["angles"])
             files = (MOTION, SMOOTH_JOINTS, ANGLES, EVENTS)
-        for table in tables.values():
-            table.attrs["history"] = [*notes, *table.attrs["history"]]
         return tables, files
 
-    points, _ = landmarks(tracked, model)
-    return _Run(tracked.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(tracked, model)}, write)
+    points, _ = landmarks(motion, model)
+    return _Run(motion.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(motion, model)}, write)
 
 
 def _has_stretch(run: _Run, boundaries_s: dict[str, list[float]], fill_s: float) -> bool:

@@ -12,6 +12,7 @@ from airborne.export.overlays import OverlaysAs
 from airborne.motion import Motion, PlayersMotion
 from airborne.tracking.tracker import Found
 from airborne.trial.file import Trial
+from airborne.types import Progress
 from airborne.video import Frames, LiveRecording, Recording
 
 AnyMotion = TypeVar("AnyMotion", Motion, PlayersMotion)
@@ -79,7 +80,7 @@ class Subject(Protocol[Found, AnyMotion]):
         ...
 
     def artists(self, folder: Path, drawn: OverlaysAs) -> Iterable[AbstractContextManager[Any]]:
-        """Return what draws the frames while they are tracked."""
+        """Return what draws the frames while they are tracked; nothing where `finish` draws them."""
         ...
 
     def draw(self, artists: Sequence[Any], frames: Frames, estimate: Found) -> None:
@@ -90,8 +91,10 @@ class Subject(Protocol[Found, AnyMotion]):
         """Keep what the end of the run needs of a time's frames."""
         ...
 
-    def finish(self, folder: Path) -> tuple[AnyMotion, dict[str, Any]]:
-        """Write the other tables; return the motion and the beginning of the summary."""
+    def finish(
+        self, folder: Path, drawn: OverlaysAs | None, progress: Progress | None
+    ) -> tuple[AnyMotion, dict[str, Any]]:
+        """Write the other tables, and draw what the artists left; return the motion and the summary's beginning."""
         ...
 
     def warnings(self) -> list[str]:

@@ -60,6 +60,7 @@ def track_trial(
     take: int | None = None,
     progress: Progress | None = None,
     find_progress: Progress | None = None,
+    fit_progress: Progress | None = None,
 ) -> TrackResult:
     """Track a trial, a body or players, and write the results into a folder.
 
@@ -69,7 +70,8 @@ def track_trial(
     behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
     `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
     `take` chooses one of the poses that were found, from 1, where the trial leaves its start to be found;
-    `find_progress`, by default `progress`, is called as the videos are looked through for it.
+    `find_progress` is called as the videos are looked through for it, `fit_progress` as a person's whole run is fitted
+    at the end; by default `progress` is.
     Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
     """
     if live and resume:
@@ -100,7 +102,7 @@ def track_trial(
         if first_frame:
             trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
         drawn = None if not pictures else "stills" if first_frame else "videos"
-        options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress)
+        options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress, fit_progress or progress)
         facts = None if found is None else found.facts
         if trial.has_players:
             opened = _open_live(trial, stack, progress) if live else open_trial(trial, facts)
@@ -122,6 +124,7 @@ class _Options:
     drawn: OverlaysAs | None  # None: no pictures
     take: int | None  # of the poses that were found
     progress: Progress | None
+    fit_progress: Progress | None
 
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
@@ -134,7 +137,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     subject, delays_s = _track(subject, options, resume=goes_on)
     connection.close()
     tracked_s = time.monotonic()
-    motion, summary = subject.finish(folder)
+    motion, summary = subject.finish(folder, options.drawn, options.fit_progress)
     summary |= corrections_of(subject.trial, motion.index.tolist())
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += [

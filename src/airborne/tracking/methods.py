@@ -34,10 +34,12 @@ FIELD_MODES: dict[Method, Literal["rows", "interpolated"]] = {
     "simplex": "interpolated",
 }
 _DIRECT = frozenset({"colour", "scale", "v_rule", "steps_mm", "steps_deg"})
+_MODEL_BASED = frozenset({"fixed_shape", "directions", "whole_run"})
 UNREAD_SETTINGS: dict[str, frozenset[str]] = {  # keys of a run's record that its method makes no use of
-    **dict.fromkeys(("refined", "joint", "hierarchical"), _DIRECT),
-    "stepping": frozenset({"fixed_shape", "directions"}),
-    "simplex": frozenset({"fixed_shape", "directions", "v_rule", "steps_mm", "steps_deg"}),
+    "refined": _DIRECT,
+    **dict.fromkeys(("joint", "hierarchical"), _DIRECT | {"whole_run"}),
+    "stepping": _MODEL_BASED,
+    "simplex": _MODEL_BASED | {"v_rule", "steps_mm", "steps_deg"},
     **dict.fromkeys(("mixture", "framework"), frozenset({"swing"})),
 }
 _SIMPLEX_SIZE = np.array([0.03] * 3 + [0.06] * 3)  # [m], [rad]

@@ -48,6 +48,7 @@ class BodySettings(_Settings):
     method: Method = "refined"
     prediction: Prediction = "smooth"
     directions: Directions = "both"  # between [[key]] tables and of limbs found again; or forward alone
+    whole_run: bool = True  # refined: fit a person's poses of all frames once more, all at once
     fixed_shape: bool = False  # joint angles stay those of the start; stepping and simplex never change them
     colour: ScoreName = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping
@@ -60,6 +61,11 @@ class BodySettings(_Settings):
         if len(self.steps_mm) != len(self.steps_deg) or not self.steps_mm:
             raise ValueError("steps_mm and steps_deg need one number each for every loop, equally many")
         return self
+
+    @property
+    def fits_whole_run(self) -> bool:
+        """Whether a run is fitted once more at its end, if the body has joints."""
+        return self.method == "refined" and self.whole_run and not self.fixed_shape
 
     def with_lights(self, lights: Lights | None, *, is_exact: bool) -> Settings:
         """Return the settings as the trackers take them, in metres and radians; lights None where unknown."""

@@ -1,0 +1,182 @@
+"""The fit of a whole run: the images of all its frames, read again, are joined by how bodies move; see `run_fit`."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airborne.body import BodyModel, Pose
+from airborne.body.chain import delta_between
+from airborne.body_fitting.skin import N_FRAMES, fit_skin
+from airborne.errors import ResultError
+from airborne.motion import Motion
+from airborne.motion.flight.momentum_table import falls_freely
+from airborne.motion.flight.phases import body_events
+from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run, invert_known, smooth_covariances
+from airborne.motion.smoothing.segments import segment_numbers, stretches
+from airborne.tracking import Estimate, Status
+from airborne.tracking.methods import Settings, tracker_of
+from airborne.tracking.model_based.image_evidence import ImageEvidence
+from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker
+from airborne.types import Progress
+from airborne.video import Frames
+from airborne.video.rereading import Rereading
+
+# frames whose poses are fitted at once, and those that are fitted with them on either side: memory stays flat
+_WINDOW, _MARGIN = 256, 16
+
+
+class FittedRun(NamedTuple):
+    """A run after the fit."""
+
+    motion: Motion
+    surface: str  # what was compared with the images: "skin" or "ellipsoids"
+
+
+def fit_whole_run(
+    reader: Rereading,
+    settings: Settings,
+    model: BodyModel,
+    motion: Motion,
+    estimates: Sequence[Estimate],
+    *,
+    keys: Collection[int] = (),
+    progress: Progress | None = None,
+) -> FittedRun | None:
+    """Fit the poses of a run to its images and to how bodies move; None where nothing can be fitted.
+
+    Motion is smooth between take-offs, landings and gaps, in stretches of five frames or more; other frames stay as
+    they are. `estimates` are those of the tracker, one for each row of the motion. In frames that have a key it is the
+    tracked pose that counts, as someone has said there what images do not. Statuses stay.
+    """
+    windows = list(_windows(motion, model))
+    if not any(window.stretches for window in windows):
+        return None
+    found = [estimate for estimate in estimates if estimate.pose is not None]
+    images = _RunImages.read(reader, settings, model, found, frozenset(keys), progress)
+    position, R, angles, covariance = (
+        each.copy() for each in (motion.position, motion.R, motion.joint_angles, motion.covariance)
+    )
+    for window in windows:
+        rows, time_s = window.rows, motion.time_s[window.rows]
+        poses = fit_run(model, [motion.pose(row) for row in rows], time_s, window.stretches, _Look(images, window))
+        covariances = smooth_covariances(model, poses, time_s, window.stretches, motion.covariance[rows])
+        for row, pose, each in list(zip(rows, poses, covariances, strict=True))[window.kept]:
+            matrix = pose.world_from_root.as_matrix()
+            position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
+            covariance[row] = each
+    fitted = replace(motion, position=position, R=R, joint_angles=angles, covariance=covariance)
+    return FittedRun(fitted, "ellipsoids" if images.skin is None else "skin")
+
+
+class _Window(NamedTuple):
+    """Frames whose poses are fitted at once."""
+
+    first: int  # which of the frames with a pose is its first
+    rows: NDArray[np.intp]  # of the motion
+    kept: slice  # of these: the others belong to the windows beside
+    stretches: Sequence[Stretch]
+
+
+def _windows(motion: Motion, model: BodyModel) -> Iterator[_Window]:
+    """Yield the windows of a run, with what is smooth in them."""
+    posed = np.flatnonzero(motion.has_pose)
+    try:
+        boundaries_s = [event.time_s for event in body_events(motion, model)]
+    except ResultError:  # they cannot be found
+        boundaries_s = []
+    segment = segment_numbers(motion.time_s, boundaries_s)
+    for start in range(0, len(posed), _WINDOW):
+        first = max(start - _MARGIN, 0)
+        rows = posed[first : start + _WINDOW + _MARGIN]
+        smooth = [
+            Stretch(each, falls_freely(motion, model, rows[each]))
+            for each in stretches(motion.time_s[rows], np.ones(len(rows), bool), segment[rows], 0.0)
+        ]
+        yield _Window(first, rows, slice(start - first, start - first + _WINDOW), smooth)
+
+
+@dataclass(slots=True, eq=False)
+class _RunImages:
+    """The images of the frames in which a run has poses, and what they all taught of body and background."""
+
+    reader: Rereading
+    model: BodyModel
+    tracker: CompensatedTracker
+    estimates: Sequence[Estimate]
+    keys: Collection[int]
+    progress: Progress | None
+    learned: CompensatedState
+    skin: RenderModel | None = None  # which is compared with the images instead of the body's ellipsoids
+    _n_read: int = field(default=0)
+
+    @classmethod
+    def read(
+        cls,
+        reader: Rereading,
+        settings: Settings,
+        model: BodyModel,
+        estimates: Sequence[Estimate],
+        keys: Collection[int],
+        progress: Progress | None,
+    ) -> _RunImages:
+        """Learn from all frames of a run."""
+        start = estimates[0].pose
+        assert start is not None
+        tracker = tracker_of(settings, model, start)
+        images = cls(reader, model, tracker, estimates, keys, progress, tracker.init())
+        tracked = [each.index for each in estimates if each.status is Status.TRACKED]
+        fitted = {tracked[k] for k in np.linspace(0, len(tracked) - 1, N_FRAMES).astype(int)} if tracked else set()
+        found = list[tuple[Frames, Pose]]()
+        for frames, estimate in zip(images.frames(estimates), estimates, strict=True):
+            images.learned = tracker.learn(images.learned, frames, estimate)
+            if estimate.index in fitted and estimate.pose is not None:
+                found.append((frames, estimate.pose))
+        skin = fit_skin(model, found)
+        images.skin = None if skin is None else RenderModel.of(skin, settings.exact_lights)
+        return images
+
+    def frames(self, estimates: Sequence[Estimate]) -> Iterator[Frames]:
+        """Yield the frames of estimates."""
+        wanted = {estimate.index for estimate in estimates}
+        for frames in self.reader.forward(min(wanted), max(wanted) + 1):
+            if frames.index in wanted:
+                yield frames
+                self._n_read += 1
+                if self.progress is not None:
+                    self.progress(self._n_read, max(self._n_read, (1 + N_STEPS) * len(self.estimates)))
+
+
+@dataclass(slots=True, eq=False)
+class _Look:
+    """One pass after the other over the images of a window."""
+
+    images: _RunImages
+    window: _Window
+    misfits: Sequence[float] = ()  # of the frames, as first seen
+
+    def __call__(self, poses: Sequence[Pose]) -> list[ImageEvidence]:
+        """Return what the images say about poses, weighed as at the first look."""
+        images, path, evidence = self.images, [], list[ImageEvidence]()
+        estimates = images.estimates[self.window.first :][: len(poses)]
+        for i, (frames, pose, estimate) in enumerate(zip(images.frames(estimates), poses, estimates, strict=True)):
+            path.append((frames.time_s, pose))
+            if frames.index in images.keys:
+                evidence.append(_tracked_evidence(estimate, pose))
+                continue
+            misfit = self.misfits[i] if self.misfits else None
+            evidence.append(images.tracker.linearise(images.learned, frames, path, misfit, surface=images.skin))
+        self.misfits = [each.misfit for each in evidence]
+        return evidence
+
+
+def _tracked_evidence(estimate: Estimate, pose: Pose) -> ImageEvidence:
+    """Return what a tracker's estimate, as it states its covariance, says about a pose."""
+    assert estimate.pose is not None and estimate.covariance is not None
+    information, away = invert_known(estimate.covariance), delta_between(pose, estimate.pose)
+    return ImageEvidence(information, information @ away, 0.5 * float(away @ information @ away), 1.0)

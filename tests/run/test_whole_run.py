@@ -1,0 +1,143 @@
+"""The fit of a person's whole run: joints err less than frame by frame, in windows too; keys and unknowns stay."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airborne.body.chain import move_pose
+from airborne.cameras import Rig
+from airborne.motion import Motion, landmarks
+from airborne.motion.files import read_motion
+from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY, TRACKED_MOTION
+from airborne.run import whole_run
+from airborne.run.opening import open_trial
+from airborne.run.whole_run import fit_whole_run
+from airborne.synthetic import somersault_scene, write_trial
+from airborne.tracking import Estimate, Status
+from airborne.trial.file import read_trial
+from airborne.video.rereading import Rereading
+from tests.support.commands import in_process
+
+N, SCALE = 13, 4
+OFF_M, OFF_RAD = 0.01, 0.05  # by which poses are wrong in every frame, in each direction
+
+
+def scene_of(target):
+    """The beginning of a somersault, small."""
+    scene = somersault_scene("moving-arms", target=target)
+    middle = (SCALE - 1) / 2
+    cameras = (
+        each.resample(
+            scale=(SCALE, SCALE), offset=(middle, middle), size=(each.size[0] // SCALE, each.size[1] // SCALE)
+        )
+        for each in scene.rig
+    )
+    return replace(scene, rig=Rig(tuple(cameras)), n_pictures=N)
+
+
+class TrackedRun:
+    """A trial, its true flight, and estimates whose poses are a little wrong in every frame."""
+
+    def __init__(self, scene, folder):
+        write_trial(scene, folder)
+        self.file, self.model = folder / "trial.toml", scene.model
+        self.trial = read_trial(self.file)
+        self.true = scene.flight(np.array([float(scene.time_s(k)) for k in range(N)]))
+        rng, self.sd = np.random.default_rng(4), np.repeat([OFF_M, OFF_RAD], [3, self.model.n_dofs - 3])
+        self.estimates = [
+            Estimate(
+                index=k,
+                time_s=scene.time_s(k),
+                status=Status.TRACKED,
+                score=5.0,
+                pose=move_pose(self.true.pose(k), self.sd * rng.normal(size=self.model.n_dofs)),
+                covariance=np.diag(self.sd**2),
+                n_views=len(scene.rig),
+            )
+            for k in range(N)
+        ]
+
+    def fit(self, estimates=None, keys=()):
+        """The motion as tracked, and what the fit of the whole run makes of it."""
+        estimates = estimates or self.estimates
+        motion = Motion.collect(estimates, tuple(segment.name for segment in self.model.segments[1:]))
+        reader = Rereading(open_trial(self.trial).recording)
+        return motion, fit_whole_run(reader, self.trial.settings, self.model, motion, estimates, keys=keys)
+
+    def error_m(self, motion, rows=slice(None)):
+        """The mean error of the landmarks."""
+        true = np.array([self.model.with_pose(self.true.pose(k)).landmarks for k in range(N)])
+        return float(np.linalg.norm(landmarks(motion, self.model)[0] - true, axis=-1)[rows].mean())
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return TrackedRun(scene_of("ellipsoids"), tmp_path_factory.mktemp("somersault"))
+
+
+def test_joints_err_less_than_frame_by_frame_and_say_so(run):
+    tracked, fitted = run.fit()
+    assert run.error_m(fitted.motion) < 0.5 * run.error_m(tracked)
+    assert fitted.surface == "ellipsoids"
+    before, after = (np.trace(each.covariance, axis1=1, axis2=2) for each in (tracked, fitted.motion))
+    assert (after < 0.8 * before).all()
+    assert fitted.motion.status.tolist() == tracked.status.tolist()
+
+
+def test_a_person_is_compared_in_a_skin(tmp_path):
+    run = TrackedRun(scene_of("skin"), tmp_path)
+    tracked, fitted = run.fit()
+    assert run.error_m(fitted.motion) < 0.6 * run.error_m(tracked)
+    assert fitted.surface == "skin"
+
+
+def test_windows_fit_nearly_what_the_whole_run_does(run, monkeypatch):
+    tracked, whole = run.fit()
+    monkeypatch.setattr(whole_run, "_WINDOW", 5)
+    monkeypatch.setattr(whole_run, "_MARGIN", 4)
+    _, windows = run.fit()
+    apart = np.linalg.norm(landmarks(windows.motion, run.model)[0] - landmarks(whole.motion, run.model)[0], axis=-1)
+    assert 0 < apart.mean() < 0.2 * run.error_m(tracked)
+
+
+def test_a_frame_with_a_key_stays_where_it_was_put(run):
+    moved = move_pose(run.true.pose(6), np.repeat([0.05, 0.0], [3, run.model.n_dofs - 3]))
+    keyed = replace(run.estimates[6], pose=moved, covariance=np.diag((0.01 * run.sd) ** 2))
+    estimates = [*run.estimates[:6], keyed, *run.estimates[7:]]
+    (_, free), (tracked, held) = run.fit(estimates), run.fit(estimates, keys=[6])
+    assert np.linalg.norm(held.motion.position[6] - tracked.position[6]) < 0.003
+    assert np.linalg.norm(free.motion.position[6] - tracked.position[6]) > 0.03
+
+
+def test_what_no_image_shows_stays_unknown_and_a_run_too_short_as_it_is(run):
+    covariance = np.diag(run.sd**2)
+    covariance[9:12], covariance[:, 9:12] = 0.0, 0.0
+    covariance[range(9, 12), range(9, 12)] = np.inf
+    estimates = [*run.estimates[:6], replace(run.estimates[6], covariance=covariance), *run.estimates[7:]]
+    fitted = run.fit(estimates)[1]
+    assert np.isinf(np.diagonal(fitted.motion.covariance[6])[9:12]).all()
+    assert np.isfinite(np.delete(np.diagonal(fitted.motion.covariance, axis1=1, axis2=2), 6, axis=0)).all()
+    assert run.fit(run.estimates[:4])[1] is None
+
+
+def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked(run, tmp_path):
+    whole, again = tmp_path / "whole", tmp_path / "again"
+    assert in_process("track", run.file, "-o", whole, "--no-pictures") == 0
+    tracked, fitted = read_motion(whole / TRACKED_MOTION), read_motion(whole / MOTION)
+    assert np.linalg.norm(fitted.position - tracked.position, axis=1).max() > 1e-4
+    shutil.copytree(whole, again)
+    (again / SUMMARY).unlink()
+    (again / MOTION).write_bytes((again / MOTION).read_bytes()[:-40])  # torn; covariance.bin is the fit's already
+    assert in_process("track", run.file, "-o", again, "--no-pictures", "--resume") == 0
+    for name in (MOTION, JOINTS, TRACKED_MOTION):
+        assert (again / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_a_trial_may_leave_poses_as_they_are_tracked(run, tmp_path):
+    plain = run.file.with_name("plain.toml")
+    text = run.file.read_text(encoding="utf-8")
+    plain.write_text(text.replace("[track]\n", "[track]\nwhole_run = false\n"), encoding="utf-8")
+    assert in_process("track", plain, "-o", tmp_path / "plain", "--no-pictures") == 0
+    assert not (tmp_path / "plain" / TRACKED_MOTION).exists()
