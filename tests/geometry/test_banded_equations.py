@@ -30,3 +30,8 @@ def test_band_is_solved_as_one_dense_system(n, d):
     equations = BandedEquations.of(own, right, *joining)
     np.testing.assert_allclose(equations.solve(), expected, rtol=ROUNDTRIP, atol=ROUNDTRIP)
     np.testing.assert_allclose(equations.right, b, rtol=ROUNDTRIP, atol=ROUNDTRIP)
+    inverse = np.linalg.inv(A.reshape(n * d, n * d)).reshape(n, d, n, d)
+    np.testing.assert_allclose(equations.covariances(), inverse[range(n), :, range(n)], rtol=ROUNDTRIP, atol=ROUNDTRIP)
+    rights = rng.normal(size=(n, d, 2))
+    expected = np.einsum("iajb,jbk->iak", inverse, rights)
+    np.testing.assert_allclose(equations.solve(rights), expected, rtol=ROUNDTRIP, atol=ROUNDTRIP)

@@ -46,9 +46,10 @@ class BandedEquations:
                         block[group, :, group] += squares[row, column]
         return cls(blocks, right)
 
-    def solve(self) -> Array:
-        """Return x (n, d)."""
+    def solve(self, rights: Array | None = None) -> Array:
+        """Return x (n, d); or for other right sides (n, d, k) their solutions (n, d, k)."""
         n, d = self.right.shape
+        rights = self.right if rights is None else rights
         band = np.zeros((3 * d, n * d))
         row, column = np.indices((d, d))
         for j, blocks in enumerate(self.blocks):
@@ -56,7 +57,8 @@ class BandedEquations:
             is_kept = below >= 0  # the band holds the lower triangle
             for i, block in enumerate(blocks):
                 band[below[is_kept], i * d + column[is_kept]] = block[is_kept]
-        return np.asarray(solveh_banded(band, self.right.ravel(), lower=True, overwrite_ab=True)).reshape(n, d)
+        columns = rights.reshape(n * d, -1)
+        return np.asarray(solveh_banded(band, columns, lower=True, overwrite_ab=True)).reshape(rights.shape)
 
     def covariances(self) -> Array:
         """Return the diagonal blocks of the inverse of A, each time's marginal covariance: (n, d, d).

@@ -64,9 +64,9 @@ def fit_whole_run(
     )
     for window in windows:
         rows, time_s = window.rows, motion.time_s[window.rows]
-        poses = fit_run(model, [motion.pose(row) for row in rows], time_s, window.stretches, _Look(images, window))
-        covariances = smooth_covariances(model, poses, time_s, window.stretches, motion.covariance[rows])
-        for row, pose, each in list(zip(rows, poses, covariances, strict=True))[window.kept]:
+        fit = fit_run(model, [motion.pose(row) for row in rows], time_s, window.stretches, _Look(images, window))
+        covariances = smooth_covariances(model, fit, time_s, window.stretches, motion.covariance[rows])
+        for row, pose, each in list(zip(rows, fit.poses, covariances, strict=True))[window.kept]:
             matrix = pose.world_from_root.as_matrix()
             position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
             covariance[row] = each
@@ -166,17 +166,17 @@ class _Look:
         estimates = images.estimates[self.window.first :][: len(poses)]
         for i, (frames, pose, estimate) in enumerate(zip(images.frames(estimates), poses, estimates, strict=True)):
             path.append((frames.time_s, pose))
-            if frames.index in images.keys:
-                evidence.append(_tracked_evidence(estimate, pose))
-                continue
             misfit = self.misfits[i] if self.misfits else None
-            evidence.append(images.tracker.linearise(images.learned, frames, path, misfit, surface=images.skin))
+            of_images = images.tracker.linearise(images.learned, frames, path, misfit, surface=images.skin)
+            is_key = frames.index in images.keys
+            evidence.append(_tracked_evidence(estimate, pose, of_images) if is_key else of_images)
         self.misfits = [each.misfit for each in evidence]
         return evidence
 
 
-def _tracked_evidence(estimate: Estimate, pose: Pose) -> ImageEvidence:
-    """Return what a tracker's estimate, as it states its covariance, says about a pose."""
+def _tracked_evidence(estimate: Estimate, pose: Pose, images: ImageEvidence) -> ImageEvidence:
+    """Return what a tracker's estimate says about a pose, by its covariance, in the place of images."""
     assert estimate.pose is not None and estimate.covariance is not None
     information, away = invert_known(estimate.covariance), delta_between(pose, estimate.pose)
-    return ImageEvidence(information, information @ away, 0.5 * float(away @ information @ away), 1.0)
+    cost, gradient = 0.5 * float(away @ information @ away), information @ away
+    return replace(images, information=information, gradient=gradient, cost=cost, of_shape=0 * images.of_shape)

@@ -8,12 +8,20 @@ import pytest
 from airborne.body.chain import delta_between, move_pose
 from airborne.body.human import human18
 from airborne.constants import FREE_FALL_M_S2
-from airborne.motion.smoothing.run_fit import Stretch, acceleration_rows, fall_offset_m, fall_rows, fit_run
+from airborne.motion.smoothing.run_fit import (
+    Stretch,
+    acceleration_rows,
+    fall_offset_m,
+    fall_rows,
+    fit_run,
+    smooth_covariances,
+)
 from airborne.synthetic.flight.articulated import Takeoff, fly_articulated, joint_motion
 from airborne.tracking.model_based.image_evidence import ImageEvidence
 
 HUMAN, N, RATE = human18(1.75, 70.0), 24, 50
 TIME_S = np.arange(N) / RATE
+SURFACE_M = 0.004  # by which errors of the surface move the root along each axis, in all frames alike
 OFFSET_M, REST = np.array([0.01, -0.02, 0.005]), np.zeros(3)
 
 
@@ -47,7 +55,8 @@ def seen(targets, sd=0.03, unseen=()):
             information = np.eye(HUMAN.n_dofs) * (k not in unseen) / sd**2
             away = delta_between(pose, target)
             gradient = information @ away
-            evidence.append(ImageEvidence(information, gradient, 0.5 * float(away @ gradient), 1.0))
+            of_shape = information[:3] * SURFACE_M
+            evidence.append(ImageEvidence(information, gradient, 0.5 * float(away @ gradient), 1.0, of_shape))
         return evidence
 
     return look
@@ -111,14 +120,14 @@ def test_steady_motion_has_no_acceleration_but_gravity():
 @pytest.mark.parametrize("falls", [False, True])
 def test_noise_of_single_frames_is_less_after(falls):
     tracked = shake(TRUTH)
-    fitted = fit_run(HUMAN, tracked, TIME_S, [Stretch(slice(0, N), falls)], seen(tracked))
+    fitted = fit_run(HUMAN, tracked, TIME_S, [Stretch(slice(0, N), falls)], seen(tracked)).poses
     assert off_m(fitted) < 0.6 * off_m(tracked)
 
 
 def test_a_free_fall_tells_where_the_body_is():
     tracked = shake(TRUTH)
     free, held = (
-        fit_run(HUMAN, tracked, TIME_S, [Stretch(slice(0, N), falls)], seen(tracked)) for falls in (False, True)
+        fit_run(HUMAN, tracked, TIME_S, [Stretch(slice(0, N), falls)], seen(tracked)).poses for falls in (False, True)
     )
     assert off_m(held) < 0.95 * off_m(free)
 
@@ -128,7 +137,7 @@ def test_neighbours_tell_of_a_frame_whose_images_show_nothing_and_that_lay_far_o
     lost = move_pose(tracked[10], np.repeat([0.3, 0.0, 0.5], [3, 3, HUMAN.n_dofs - 6]))
     start = [*tracked[:10], lost, *tracked[11:]]
     look = seen(start, sd=0.005, unseen=(10,))
-    fitted = fit_run(HUMAN, start, TIME_S, [Stretch(slice(0, N), falls=True)], look)
+    fitted = fit_run(HUMAN, start, TIME_S, [Stretch(slice(0, N), falls=True)], look).poses
     assert off_m(start, slice(10, 11)) > 0.3
     assert off_m(fitted, slice(10, 11)) < 0.01
 
@@ -136,8 +145,8 @@ def test_neighbours_tell_of_a_frame_whose_images_show_nothing_and_that_lay_far_o
 def test_stretches_do_not_know_of_each_other_and_frames_outside_stay():
     tracked = shake(TRUTH)
     halves = [Stretch(slice(0, 10), falls=False), Stretch(slice(12, N), falls=False)]
-    both = fit_run(HUMAN, tracked, TIME_S, halves, seen(tracked))
-    moved = fit_run(HUMAN, tracked, TIME_S, halves, seen([*tracked[:12], *shake(TRUTH, seed=5)[12:]]))
+    both = fit_run(HUMAN, tracked, TIME_S, halves, seen(tracked)).poses
+    moved = fit_run(HUMAN, tracked, TIME_S, halves, seen([*tracked[:12], *shake(TRUTH, seed=5)[12:]])).poses
     for k in range(12):
         assert abs(delta_between(both[k], moved[k])).max() < 1e-9
     assert max(abs(delta_between(both[k], moved[k])).max() for k in range(12, N)) > 1e-3
@@ -153,5 +162,36 @@ def test_a_step_that_raises_the_cost_is_shortened():
         gained = float(sum(abs(delta_between(a, b)).sum() for a, b in zip(poses, tracked, strict=True)))
         return [replace(each, cost=1e6 * gained) for each in honest(poses)]
 
-    fitted = fit_run(HUMAN, tracked, TIME_S, [Stretch(slice(0, N), falls=False)], look)
+    fitted = fit_run(HUMAN, tracked, TIME_S, [Stretch(slice(0, N), falls=False)], look).poses
     assert all(a is b for a, b in zip(fitted, tracked, strict=True))
+
+
+@pytest.mark.parametrize("falls", [False, True])
+def test_covariances_hold_the_errors_that_smooth_motion_leaves(falls):
+    sd, n_runs = 0.03, 8
+    stretches, covariances = [Stretch(slice(0, N), falls)], np.tile(sd**2 * np.eye(HUMAN.n_dofs), (N, 1, 1))
+    shares = []
+    for seed in range(n_runs):
+        fit = fit_run(HUMAN, TRUTH, TIME_S, stretches, seen(shake(TRUTH, sd, seed)))
+        silent = [replace(each, of_shape=0 * each.of_shape) for each in fit.evidence]
+        left = smooth_covariances(HUMAN, fit._replace(evidence=silent), TIME_S, stretches, covariances)
+        errors = np.array([delta_between(true, pose) for true, pose in zip(TRUTH, fit.poses, strict=True)])
+        shares.append(np.mean(errors**2 / np.diagonal(left, axis1=1, axis2=2)))
+        assert (np.diagonal(left, axis1=1, axis2=2) < 0.9 * sd**2).all()
+    assert 0.6 < np.mean(shares) < 1.2
+
+
+def test_errors_of_the_surface_pass_the_fit_as_they_are_and_open_directions_stay_open():
+    covariances = np.tile(0.03**2 * np.eye(HUMAN.n_dofs), (N, 1, 1))
+    covariances[5, 20, 20] = np.inf
+    fit, stretches = (
+        fit_run(HUMAN, TRUTH, TIME_S, [Stretch(slice(0, N), False)], seen(TRUTH)),
+        [Stretch(slice(0, 20), False)],
+    )
+    silent = fit._replace(evidence=[replace(each, of_shape=0 * each.of_shape) for each in fit.evidence])
+    both = smooth_covariances(HUMAN, fit, TIME_S, stretches, covariances)
+    without = smooth_covariances(HUMAN, silent, TIME_S, stretches, covariances)
+    added = np.diagonal(both[:20, :3, :3] - without[:20, :3, :3], axis1=1, axis2=2)
+    np.testing.assert_allclose(added, SURFACE_M**2, rtol=0.05)
+    assert np.argwhere(np.isinf(np.diagonal(both, axis1=1, axis2=2))).tolist() == [[5, 20]]
+    np.testing.assert_array_equal(both[20:], covariances[20:])

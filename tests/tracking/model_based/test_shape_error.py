@@ -5,7 +5,7 @@ import pytest
 
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
 from airborne.tracking.model_based.gauss_newton import linearise_images
-from airborne.tracking.model_based.shape_error import SHAPE_SD_M, shape_error_gradients
+from airborne.tracking.model_based.shape_error import SHAPE_SD_M, shape_error_gradients, shape_gradients
 from tests.support.people import FOCAL_PX, HUMAN
 from tests.tracking.test_misplaced_limb import LearnedFrame
 
@@ -25,6 +25,17 @@ def test_pixels_within_a_limbs_width_share_their_error_where_joints_move(frame, 
     regions, _ = frame.views(frame.truth)
     equations = linearise_images(frame.render_model, frame.truth, regions, frame.appearance, dofs=dofs(HUMAN))
     assert equations.misfit / equations.noise == pytest.approx(shared_px / BLURRED_PX, rel=0.1)
+
+
+def test_along_a_segments_own_axes_the_error_turns_with_it(frame):
+    """The gradients by a segment's three axes are those by the world's, turned; their sum of squares is the same."""
+    regions, _ = frame.views(frame.truth)
+    dofs, posed = all_joints(HUMAN), frame.render_model.with_pose(frame.truth)
+    equations = linearise_images(frame.render_model, frame.truth, regions, frame.appearance, dofs=dofs)
+    own = shape_gradients(equations, posed).reshape(len(posed.R), 3, -1)
+    by_world = np.einsum("sitp,tpd->sid", equations.patches[-1].reshape(len(own), 3, len(own), 6), equations.J)
+    np.testing.assert_allclose(np.einsum("sik,skd->sid", posed.R, own), by_world, atol=1e-9 * abs(by_world).max())
+    assert abs(own - by_world).max() > 0.1 * abs(by_world).max()
 
 
 @pytest.mark.parametrize("n_views", [1, 4])

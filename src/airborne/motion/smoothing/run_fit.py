@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -51,10 +52,15 @@ class Stretch:
     falls: bool
 
 
-def fit_run(
-    model: BodyModel, poses: Sequence[Pose], time_s: Array, stretches: Sequence[Stretch], look: Look
-) -> list[Pose]:
-    """Return the most probable poses at the times (n,) [s], from poses near them; outside of stretches they stay.
+class RunFit(NamedTuple):
+    """The most probable poses of a run, and what its images said about those before the last step."""
+
+    poses: Sequence[Pose]
+    evidence: Sequence[ImageEvidence]
+
+
+def fit_run(model: BodyModel, poses: Sequence[Pose], time_s: Array, stretches: Sequence[Stretch], look: Look) -> RunFit:
+    """Fit the poses at the times (n,) [s], which are near already; outside of stretches they stay.
 
     The last step is not looked at any more.
     """
@@ -65,23 +71,27 @@ def fit_run(
     rule = BacktrackingRule(_SHORTER, _LEAST_SHARE)
     descent = descend(evaluate(poses), evaluate, rule, most_steps=N_STEPS - 1, slack=_SLACK)
     best = descent.best
-    return list(best.poses if descent.n_losses else best.step(1.0)[0])
+    return RunFit(best.poses if descent.n_losses else best.step(1.0)[0], best.evidence)
 
 
 def smooth_covariances(
-    model: BodyModel, poses: Sequence[Pose], time_s: Array, stretches: Sequence[Stretch], covariances: Array
+    model: BodyModel, fit: RunFit, time_s: Array, stretches: Sequence[Stretch], covariances: Array
 ) -> Array:
-    """Return the covariances of the poses of a run that was fitted, from those of its frames by themselves: (n, d, d).
+    """Return the covariances of the poses of a fitted run, from those of its frames by themselves: (n, d, d).
 
-    To smooth motion the errors of single frames are noise; on ten synthetic somersaults those of joints without
-    constant offset fall by as much as these covariances say. A direction that a frame leaves open stays open.
+    To smooth motion the errors of single frames are noise, of which it leaves little. Errors of the surface last all
+    run long: they pass the fit as they are, and are added. A direction that a frame leaves open stays open.
     """
     fitted = covariances.copy()
     for stretch in stretches:
-        own = np.array([invert_known(each) for each in covariances[stretch.rows]]) + _DAMPING * np.eye(model.n_dofs)
-        joining = _joining_rows(model, poses, time_s, stretch)
+        rows, damping = stretch.rows, _DAMPING * np.eye(model.n_dofs)
+        joining = _joining_rows(model, fit.poses, time_s, stretch)
+        own = np.array([invert_known(each) + damping for each in covariances[rows]])
         left = BandedEquations.of(own, np.zeros(own.shape[:2]), *joining).covariances()
-        fitted[stretch.rows] = np.where(np.isfinite(covariances[stretch.rows]), left, covariances[stretch.rows])
+        own = np.array([each.information + damping for each in fit.evidence[rows]])
+        of_shape = np.array([each.of_shape.T for each in fit.evidence[rows]])
+        moved = BandedEquations.of(own, np.zeros(own.shape[:2]), *joining).solve(of_shape)
+        fitted[rows] = np.where(np.isfinite(covariances[rows]), left + moved @ moved.swapaxes(1, 2), covariances[rows])
     return fitted
 
 

@@ -18,6 +18,7 @@ from airborne.tracking.model_based.gauss_newton import linearise_images
 from airborne.tracking.model_based.later_frames import MARGIN_PX
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.model_based.shape_error import shape_gradients
 from airborne.types import Array
 from airborne.video import Frames
 
@@ -33,6 +34,7 @@ class ImageEvidence:
     gradient: Array  # (d,)
     cost: float  # [nat]
     misfit: float  # variance of the images' residual, by which they are weighed
+    of_shape: Array  # (k, d) changes of the gradient by errors of the surface of an sd each, the same at all times
 
 
 def image_evidence(
@@ -56,6 +58,6 @@ def image_evidence(
     images = linearise_images(render_model, pose, regions, appearance, dofs=dofs)
     possible = linearise_prior(dofs, pose, PosePrior(pose, np.full(len(dofs.columns), np.inf)))
     misfit = max(images.misfit, 1e-9) if misfit is None else misfit
-    return ImageEvidence(
-        images.A / misfit + possible.H, images.g / misfit + possible.g, images.objective(misfit, possible.cost), misfit
-    )
+    of_shape = shape_gradients(images, posed) / misfit
+    cost = images.objective(misfit, possible.cost)
+    return ImageEvidence(images.A / misfit + possible.H, images.g / misfit + possible.g, cost, misfit, of_shape)

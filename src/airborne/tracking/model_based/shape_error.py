@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from airborne.body import PosedBody
+from airborne.tracking.model_based.pose_descent import PoseEquations
 from airborne.tracking.model_based.render_model import ViewBuffers
 from airborne.types import Array
 
@@ -24,6 +25,17 @@ def shape_error_gradients(A: Array) -> Array:
     rows = np.zeros((n, 3, n, 6))
     rows[np.arange(n), :, np.arange(n)] = SHAPE_SD_M * A[:, :3]
     return rows.reshape(3 * n, n, 6)
+
+
+def shape_gradients(equations: PoseEquations, posed: PosedBody) -> Array:
+    """Return the same of a body whose joints move, along the segments' own axes, mapped to the pose: (3 segments, d).
+
+    Along its own axes a segment's error is the same in every pose.
+    """
+    n = len(posed.R)
+    by_twist = equations.patches[-1].reshape(n, 3, n, 6)
+    own = np.einsum("sik,sitp->sktp", posed.R, by_twist)
+    return np.einsum("sktp,tpd->skd", own, equations.J).reshape(3 * n, -1)
 
 
 def shape_error_px(view: ViewBuffers, posed: PosedBody) -> float:
