@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ from airborne.video.rereading import Rereading
 
 # frames whose poses are fitted at once, and those that are fitted with them on either side: memory stays flat
 _WINDOW, _MARGIN = 256, 16
+_MOST_BYTES = 6e8  # of pictures held at once; others are decoded again for every step
 
 
 class FittedRun(NamedTuple):
@@ -113,6 +115,7 @@ class _RunImages:
     progress: Progress | None
     learned: CompensatedState
     skin: RenderModel | None = None  # which is compared with the images instead of the body's ellipsoids
+    _held: dict[int, Frames] = field(default_factory=dict)
     _n_read: int = field(default=0)
 
     @classmethod
@@ -142,14 +145,31 @@ class _RunImages:
         return images
 
     def frames(self, estimates: Sequence[Estimate]) -> Iterator[Frames]:
-        """Yield the frames of estimates."""
-        wanted = {estimate.index for estimate in estimates}
-        for frames in self.reader.forward(min(wanted), max(wanted) + 1):
-            if frames.index in wanted:
+        """Yield the frames of estimates; as many as may be held are decoded once, until later ones are asked for."""
+        wanted = [estimate.index for estimate in estimates]
+        self._held = {index: frames for index, frames in self._held.items() if index >= wanted[0]}
+        held = [self._held[index] for index in wanted if index in self._held]
+        for frames in chain(held, self._read(wanted[len(held) :])):
+            yield frames
+            self._n_read += 1
+            if self.progress is not None:
+                self.progress(self._n_read, max(self._n_read, (1 + N_STEPS) * len(self.estimates)))
+
+    def _read(self, wanted: Sequence[int]) -> Iterator[Frames]:
+        """Yield frames, which come after those that are held."""
+        if not wanted:
+            return
+        n_bytes, all_wanted = sum(map(_n_bytes, self._held.values())), set(wanted)
+        for frames in self.reader.forward(wanted[0], wanted[-1] + 1):
+            if frames.index in all_wanted:
+                n_bytes += _n_bytes(frames)
+                if n_bytes <= _MOST_BYTES:
+                    self._held[frames.index] = frames
                 yield frames
-                self._n_read += 1
-                if self.progress is not None:
-                    self.progress(self._n_read, max(self._n_read, (1 + N_STEPS) * len(self.estimates)))
+
+
+def _n_bytes(frames: Frames) -> int:
+    return sum(view.rgb.nbytes for view in frames.views if view is not None)
 
 
 @dataclass(slots=True, eq=False)
