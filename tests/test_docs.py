@@ -22,7 +22,7 @@ from airborne.evaluation import PlayerErrors, PlayersComparison
 from airborne.evaluation.jump_errors import JumpErrors
 from airborne.evaluation.players import PartErrors
 from airborne.export.figures import write_figures
-from airborne.motion import covariance_file, flight_summary
+from airborne.motion import covariance_file, flight_summary, measure_flight
 from airborne.motion.files import _header
 from airborne.motion.run_folder import SMOOTH_JOINTS, SMOOTH_RECORD, TABLES, TRACKED_MOTION, figures_of
 from airborne.run import smooth
@@ -315,7 +315,7 @@ def test_every_column_of_a_body_with_joints_is_documented(person, name):
 
 def test_every_number_of_a_flight_is_documented(person):
     documented = [name for row in table_of(RESULTS, "`flight`") for name in named(row[0])]
-    assert sorted(documented) == sorted(flight_summary(person[1], PERSON).to_dict())
+    assert sorted(documented) == sorted(flight_summary(person[1], measure_flight(person[1], PERSON)).to_dict())
 
 
 def test_the_segments_of_a_person_and_their_limits_are_documented():

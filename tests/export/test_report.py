@@ -9,7 +9,7 @@ from airborne.export import headline, page
 from airborne.export.figures import write_figures
 from airborne.export.page import format_value, label
 from airborne.export.report import write_report
-from airborne.motion import Motion, flight_summary, landmarks
+from airborne.motion import Motion, flight_summary, landmarks, measure_flight
 from airborne.motion.run_folder import figures_of
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 
@@ -90,7 +90,7 @@ def test_a_comparison_with_the_truth_becomes_a_table(tmp_path):
 def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_not(tmp_path):
     motion = person_run()
     write_figures(figures_of(tmp_path), motion, PERSON)
-    html = html_of(tmp_path, motion, flight=flight_summary(motion, PERSON).to_dict())
+    html = html_of(tmp_path, motion, flight=flight_summary(motion, measure_flight(motion, PERSON)).to_dict())
     words = (
         "<h2>Joints</h2>",
         "<h2>Centre of mass and angular momentum</h2>",
@@ -107,7 +107,7 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
 def test_unknown_numbers_of_a_flight_are_shown_as_not_known(tmp_path):
     motion = person_run(2)
     write_figures(figures_of(tmp_path), motion, PERSON)
-    html = html_of(tmp_path, motion, flight=flight_summary(motion, PERSON).to_dict())
+    html = html_of(tmp_path, motion, flight=flight_summary(motion, measure_flight(motion, PERSON)).to_dict())
     assert "fitted, free fall</th><td>not known</td><td>9.81</td>" in html
 
 

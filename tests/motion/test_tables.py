@@ -14,6 +14,7 @@ from airborne.body.shaping import half_widths_m
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.motion import (
     Motion,
+    measure_flight,
     root_angles,
     write_angles,
     write_flight,
@@ -141,8 +142,11 @@ def test_joint_deviation_is_that_of_sampled_poses(tmp_path):
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])
 def test_columns_of_a_jointed_body_are_documented(tmp_path, name):
     model = figure()
-    write = {"joint_angles.csv": write_joint_angles, "flight.csv": write_flight}[name]
-    write(tmp_path / name, motion_of(model, swinging(model, [0.0, 0.02])), model)
+    motion = motion_of(model, swinging(model, [0.0, 0.02]))
+    if name == "flight.csv":
+        write_flight(tmp_path / name, motion, measure_flight(motion, model))
+    else:
+        write_joint_angles(tmp_path / name, motion, model)
     page = (ROOT / "docs" / "reference" / "results.md").read_text(encoding="utf-8")
     table = re.search(rf"^## `{re.escape(name)}`\n\n((?:\|.*\n)+)", page, re.MULTILINE)[1]
     documented = [column for line in table.splitlines()[2:] for column in re.findall(r"`(\w+)`", line.split("|")[1])]

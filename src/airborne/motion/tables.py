@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,13 @@ from airborne.body import BodyModel
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.io.writing import write_text
 from airborne.motion.angles import ROOT_ANGLES, root_angles
-from airborne.motion.flight.momentum_table import measure_flight
 from airborne.motion.isb import isb_angles
 from airborne.motion.joints import joint_angles, joint_statuses, landmarks
 from airborne.motion.motion import Motion
 from airborne.types import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _UNITS = {"_m": "m", "_s": "s", "_deg": "deg", "_m_sd": "m", "_deg_sd": "deg"}
 
@@ -110,12 +113,11 @@ def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
     _write_csv(path, columns | {"isb_is_singular": isb["isb_is_singular"].to_numpy().astype(int).ravel()})
 
 
-def write_flight(path: Path, motion: Motion, model: BodyModel) -> None:
+def write_flight(path: Path, motion: Motion, table: xr.Dataset) -> None:
     """Write flight.csv: the centre of mass, the angular momentum about it, the root's rotation, units in the names.
 
-    Raises BodyError where a segment has no inertia, ResultError for another body's motion.
+    The table is that of `measure_flight`.
     """
-    table = measure_flight(motion, model)
     columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
     for name, stem in (("com", "com_{}_m"), ("angular_momentum", "L_{}_kg_m2_s")):
         columns |= {stem.format(axis): table[name].sel(space=axis).to_numpy() for axis in "xyz"}

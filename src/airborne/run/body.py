@@ -37,7 +37,7 @@ from airborne.motion.run_folder import (
     videos_of,
 )
 from airborne.motion.tables import write_uncertainty
-from airborne.run.body_tables import has_flight, write_tables
+from airborne.run.body_tables import write_tables
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, is_seen
@@ -240,7 +240,7 @@ class BodyRun:
         revise_motion(folder / self.table, motion)
         if checked.found is not None:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
-        write_tables(folder, motion, model)
+        flight = write_tables(folder, motion, model)
         if drawn == "videos" and self._fits_whole_run:
             self._draw_again(folder, drawn)
         self.recording.events.extend(checked.doubts)
@@ -248,7 +248,7 @@ class BodyRun:
         return motion, {
             "name": self.trial.name,
             **headline(motion),
-            **({"flight": flight_summary(motion, model).to_dict()} if has_flight(motion, model) else {}),
+            **({} if flight is None else {"flight": flight_summary(motion, flight).to_dict()}),
             **({} if fitted is None else {"whole_run": fitted.surface}),
             "self_check": checked.findings,
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,

@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Inertia, Pose, Segment
 from airborne.body.human import human18
-from airborne.motion import flight_summary
+from airborne.motion import flight_summary, measure_flight
 from airborne.motion.flight.momentum import angular_momenta, angular_momentum, centre_of_mass
 from airborne.synthetic.flight.articulated import Takeoff, fly_articulated, joint_motion
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
@@ -106,7 +106,7 @@ def test_measured_momentum_of_a_simulated_flight_with_moving_arms_is_the_simulat
     flown = fly_articulated(model, start, joint_motion(np.array([0.05, 0.3]), angles), np.arange(21) / 50)
     motion = motion_of(model, [flown.pose(k) for k in range(21)])
     np.testing.assert_allclose(angular_momenta(motion, model)[0], np.tile(momentum, (21, 1)), atol=0.01 * 60)
-    summary = flight_summary(motion, model)
+    summary = flight_summary(motion, measure_flight(motion, model))
     assert summary.fitted_gravity_m_s2 == pytest.approx(9.81, abs=SOLVED)
     assert summary.ballistic_rms_mm < 1e3 * ROUNDTRIP
 

@@ -36,6 +36,10 @@ def falling(gravity=9.81, turns=1.25):
     return poses
 
 
+def summarise(motion, model=MODEL):
+    return flight_summary(motion, measure_flight(motion, model))
+
+
 def test_centre_of_mass_deviations_are_those_of_sampled_poses():
     rng, covariance, n = np.random.default_rng(1), small_covariance(MODEL), 1000
     (pose,) = swinging(MODEL, [0.1])
@@ -46,7 +50,7 @@ def test_centre_of_mass_deviations_are_those_of_sampled_poses():
 
 
 def test_summary_of_a_free_fall_finds_gravity_rotations_and_a_constant_momentum():
-    summary = flight_summary(motion_of(MODEL, falling()), MODEL)
+    summary = summarise(motion_of(MODEL, falling()))
     assert summary.fitted_gravity_m_s2 == pytest.approx(9.81, abs=ROUNDTRIP)
     assert summary.ballistic_rms_mm < 1e3 * ROUNDTRIP
     assert summary.somersault_rev == pytest.approx(1.25, abs=ROUNDTRIP)
@@ -59,7 +63,7 @@ def test_summary_of_a_free_fall_finds_gravity_rotations_and_a_constant_momentum(
 
 
 def test_a_body_that_does_not_fall_freely_is_detected_by_its_gravity_and_its_distance_from_free_fall():
-    summary = flight_summary(motion_of(MODEL, falling(gravity=8.0)), MODEL)
+    summary = summarise(motion_of(MODEL, falling(gravity=8.0)))
     assert summary.fitted_gravity_m_s2 == pytest.approx(8.0, abs=ROUNDTRIP)
     t = TIMES - TIMES.mean()
     expected = 0.5 * 1.81 * np.std(t**2)  # what a line cannot take up of the lacking acceleration, even in time
@@ -92,7 +96,7 @@ def test_centre_of_mass_of_a_somersault_is_moved_to_where_it_falls():
     before = np.array([centre_of_mass(off.with_pose(pose))[0] for pose in poses])
     error, rise = measure_flight(motion, off)["com"].to_numpy() - true, (before - true).std(axis=0).max()
     assert error.std(axis=0).max() < 0.1 * rise
-    summary = flight_summary(motion, off)
+    summary = summarise(motion, off)
     assert abs(summary.fitted_gravity_m_s2 - 9.81) < min(2 * summary.fitted_gravity_sd_m_s2 + 0.02, 0.1)
 
 
@@ -104,14 +108,14 @@ def test_centre_of_mass_of_a_fall_without_a_turn_stays():
 
 @pytest.mark.parametrize("lost", [range(21), range(1, 21), range(2, 21)])
 def test_too_few_poses_leave_the_summary_unknown_not_broken(lost):
-    summary = flight_summary(motion_of(MODEL, falling(), lost=lost), MODEL)
+    summary = summarise(motion_of(MODEL, falling(), lost=lost))
     assert np.isnan(summary.fitted_gravity_m_s2)
     assert summary.n_poses == 21 - len(lost)
 
 
 def test_table_has_a_unit_in_every_column_and_empty_cells_where_lost(tmp_path):
     motion = motion_of(MODEL, falling(), covariance=small_covariance(MODEL), lost=[5])
-    write_flight(tmp_path / "flight.csv", motion, MODEL)
+    write_flight(tmp_path / "flight.csv", motion, measure_flight(motion, MODEL))
     with (tmp_path / "flight.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == COLUMNS.split(",")

@@ -77,15 +77,7 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     """
     import xarray as xr
 
-    require_body(motion, model)
-    missing = [segment.name for segment in model.segments if segment.inertia is None]
-    if missing:
-        raise BodyError(f"body '{model.name}' has no mass for {', '.join(missing[:3])}; give every segment its inertia")
-    com, variance = np.full((2, len(motion), 3), np.nan)
-    for row in np.flatnonzero(motion.has_pose):
-        com[row], jacobian = centre_of_mass(model.with_pose(motion.pose(row)))
-        variance[row] = propagate_variances(jacobian, limit_rotation_variance(motion.covariance[row]))
-    com, variance = _as_it_falls(motion, com, variance)
+    com, variance = centres_of_mass(motion, model)
     momentum, momentum_variance = angular_momenta(motion, model, window)
     somersault, tilt, twist = root_angles(motion).deg.T
     axes, units = ("time", "space"), "kg m2/s"
@@ -107,9 +99,21 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     return xr.Dataset(variables, coordinates, {"history": history})
 
 
-def flight_summary(motion: Motion, model: BodyModel, window: int = WINDOW) -> FlightSummary:
-    """Reduce a flight to its headline numbers. Raises as `measure_flight` does."""
-    table = measure_flight(motion, model, window)
+def centres_of_mass(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
+    """Return `com` of `measure_flight` and its variances, both (n, 3) [m, m2]; raises as that does."""
+    require_body(motion, model)
+    missing = [segment.name for segment in model.segments if segment.inertia is None]
+    if missing:
+        raise BodyError(f"body '{model.name}' has no mass for {', '.join(missing[:3])}; give every segment its inertia")
+    com, variance = np.full((2, len(motion), 3), np.nan)
+    for row in np.flatnonzero(motion.has_pose):
+        com[row], jacobian = centre_of_mass(model.with_pose(motion.pose(row)))
+        variance[row] = propagate_variances(jacobian, limit_rotation_variance(motion.covariance[row]))
+    return _as_it_falls(motion, com, variance)
+
+
+def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
+    """Reduce a flight, as `measure_flight` gives it, to its headline numbers."""
     rows = np.flatnonzero(motion.has_pose)
     momentum = table["angular_momentum"].to_numpy()
     momentum = momentum[np.isfinite(momentum).all(axis=-1)]

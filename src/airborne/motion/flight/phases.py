@@ -18,7 +18,7 @@ from airborne.motion.flight.fall import (
     is_free_fall,
     local_accelerations,
 )
-from airborne.motion.flight.momentum_table import has_inertias, measure_flight
+from airborne.motion.flight.momentum_table import centres_of_mass, has_inertias
 from airborne.motion.free_fall import GENERIC_NOISE, combine_sides, noise_covariance, side_likelihood
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.motion import Motion
@@ -48,8 +48,8 @@ def body_events(motion: Motion, model: BodyModel) -> tuple[Event, ...]:
     freely (see `ballistic_point`). See `find_flight_events`.
     """
     if has_inertias(model):
-        table = measure_flight(motion, model)
-        height, sd = (table[name].sel(space="z").to_numpy() for name in ("com", "com_sd"))
+        com, variance = centres_of_mass(motion, model)
+        height, sd = com[:, 2], standard_deviation(variance[:, 2])
     else:
         height = (motion.position + motion.R @ ballistic_point(motion))[:, 2]
         sd = standard_deviation(motion.covariance[:, 2, 2])

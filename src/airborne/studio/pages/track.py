@@ -214,8 +214,9 @@ class _Panel:
         elif (n_own := n_done - self.n_before) > 2 and n_done < n_frames:
             left = f", about {(command.seconds - self._begun_s) / n_own * (n_frames - n_done):.0f} s left"
         self.bar.value = n_done / max(n_frames, 1)
-        is_looking = not n_done and command.progress().startswith("looking")
-        stage = command.progress() if is_looking else describe_progress(n_done, n_frames)
+        said = command.progress()
+        is_another = said.startswith("fitting") or (not n_done and said.startswith("looking"))  # stage than tracking
+        stage = said if is_another else describe_progress(n_done, n_frames)
         self.says.text = f"{stage}, {command.seconds:.0f} s{left}"
 
     def _say_end(self, command: Command) -> None:
