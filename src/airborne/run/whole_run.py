@@ -56,8 +56,8 @@ def fit_whole_run(
     they are. `estimates` are those of the tracker, one for each row of the motion. In frames that have a key it is the
     tracked pose that counts, as someone has said there what images do not. Statuses stay.
     """
-    windows = list(_windows(motion, model))
-    if not any(window.stretches for window in windows):
+    windows = [window for window in _windows(motion, model) if window.stretches]
+    if not windows:
         return None
     found = [estimate for estimate in estimates if estimate.pose is not None]
     images = _RunImages.read(reader, settings, model, found, frozenset(keys), progress)
