@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+from collections import deque
 from collections.abc import Collection, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from itertools import chain
 from typing import NamedTuple
 
@@ -23,6 +27,7 @@ from airborne.tracking import Estimate, Status
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.model_based.image_evidence import ImageEvidence
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.predictors import PoseHistory
 from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker
 from airborne.types import Progress
 from airborne.video import Frames
@@ -30,6 +35,7 @@ from airborne.video.rereading import Rereading
 
 # frames whose poses are fitted at once, and those that are fitted with them on either side: memory stays flat
 _WINDOW, _MARGIN = 256, 16
+_N_THREADS = min(os.cpu_count() or 1, 8)  # the kernels let go of Python's lock; each holds the images of a time
 _MOST_BYTES = 6e8  # of pictures held at once; others are decoded again for every step
 
 
@@ -73,7 +79,7 @@ def fit_whole_run(
             position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
             covariance[row] = each
     fitted = replace(motion, position=position, R=R, joint_angles=angles, covariance=covariance)
-    return FittedRun(fitted, "ellipsoids" if images.skin is None else "skin")
+    return FittedRun(fitted, "skin" if images.is_skin else "ellipsoids")
 
 
 class _Window(NamedTuple):
@@ -114,7 +120,8 @@ class _RunImages:
     keys: Collection[int]
     progress: Progress | None
     learned: CompensatedState
-    skin: RenderModel | None = None  # which is compared with the images instead of the body's ellipsoids
+    surfaces: list[RenderModel] = field(default_factory=list)  # alike, each for one thread at a time
+    is_skin: bool = False  # whether they are a smooth skin instead of the body's ellipsoids
     _held: dict[int, Frames] = field(default_factory=dict)
     _n_read: int = field(default=0)
 
@@ -141,8 +148,18 @@ class _RunImages:
             if estimate.index in fitted and estimate.pose is not None:
                 found.append((frames, estimate.pose))
         skin = fit_skin(model, found)
-        images.skin = None if skin is None else RenderModel.of(skin, settings.exact_lights)
+        images.is_skin, surface = skin is not None, skin or model
+        images.surfaces = [RenderModel.of(surface, settings.exact_lights) for _ in range(_N_THREADS)]
         return images
+
+    def linearise(self, frames: Frames, path: PoseHistory, misfit: float | None, tracked: Estimate) -> ImageEvidence:
+        """Return what the images of a time say about the last pose of a path; called by `_N_THREADS` at once."""
+        surface = self.surfaces.pop()  # its workspace serves one thread
+        try:
+            found = self.tracker.linearise(self.learned, frames, path, misfit, surface=surface)
+        finally:
+            self.surfaces.append(surface)
+        return _tracked_evidence(tracked, path[-1][1], found) if frames.index in self.keys else found
 
     def frames(self, estimates: Sequence[Estimate]) -> Iterator[Frames]:
         """Yield the frames of estimates; as many as may be held are decoded once, until later ones are asked for."""
@@ -182,14 +199,16 @@ class _Look:
 
     def __call__(self, poses: Sequence[Pose]) -> list[ImageEvidence]:
         """Return what the images say about poses, weighed as at the first look."""
-        images, path, evidence = self.images, [], list[ImageEvidence]()
-        estimates = images.estimates[self.window.first :][: len(poses)]
-        for i, (frames, pose, estimate) in enumerate(zip(images.frames(estimates), poses, estimates, strict=True)):
-            path.append((frames.time_s, pose))
-            misfit = self.misfits[i] if self.misfits else None
-            of_images = images.tracker.linearise(images.learned, frames, path, misfit, surface=images.skin)
-            is_key = frames.index in images.keys
-            evidence.append(_tracked_evidence(estimate, pose, of_images) if is_key else of_images)
+        images, path, evidence = self.images, list[tuple[Fraction, Pose]](), list[ImageEvidence]()
+        estimates, waiting = images.estimates[self.window.first :][: len(poses)], deque[Future[ImageEvidence]]()
+        with ThreadPoolExecutor(_N_THREADS) as pool:
+            for i, (frames, pose) in enumerate(zip(images.frames(estimates), poses, strict=True)):
+                path.append((frames.time_s, pose))
+                misfit = self.misfits[i] if self.misfits else None
+                waiting.append(pool.submit(images.linearise, frames, tuple(path), misfit, estimates[i]))
+                if len(waiting) > _N_THREADS:
+                    evidence.append(waiting.popleft().result())
+            evidence += [each.result() for each in waiting]
         self.misfits = [each.misfit for each in evidence]
         return evidence
 
