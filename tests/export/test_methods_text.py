@@ -21,6 +21,8 @@ def test_a_body():
     ):  # fmt: skip
         assert words in text
     assert "all is well" not in text
+    assert "fitted together" not in text
+    assert "fitted together to the images, by a smooth skin" in describe_methods({**BODY, "whole_run": "skin"})
 
 
 def test_players_and_what_is_missing():

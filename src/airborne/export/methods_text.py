@@ -15,6 +15,7 @@ _WAYS = {
     **dict.fromkeys(("stepping", "simplex"), _COMPARED),
     "blocker": "by fitting a model of each player's legs to the images of all cameras, frame by frame",
 }
+_SURFACES = {"skin": "a smooth skin of the body", "ellipsoids": "the same model"}
 _PARTICLES = "with particle filters on the colours of the players' legs"
 
 
@@ -27,6 +28,11 @@ def describe_methods(summary: Mapping[str, Any]) -> str:
         f"{what} was measured from the videos of {count(len(cameras), 'calibrated camera')}, without markers, with "
         f"Airborne {versions.get('airborne', '')} (method '{method}'), {_WAYS.get(method, _PARTICLES)}."
     ]
+    if surface := _SURFACES.get(summary.get("whole_run", "")):
+        text.append(
+            f"The poses of all frames were then fitted together to the images, by {surface}, with smooth accelerations "
+            "and, in flight, a centre of mass that falls freely."
+        )
     errors = [each["calibration_rms_px"] for each in cameras if each.get("calibration_rms_px") is not None]
     if errors:
         text.append(f"The calibration left residuals of {_span(errors, '.2f')} px RMS in the cameras.")
