@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airborne.cameras import Rig
 from airborne.video import Recording, VideoSource, open_recording
+from airborne.video import recording as recording_module
 from airborne.video.recording import _notes
+from airborne.video.undistortion import undistortion_of
 from tests.support.clips import SIZE, numbered, numbers_of, packets_of, plain_rig, textured, with_noise, write_clip
 
 
@@ -96,6 +99,20 @@ def test_start_stop_and_every_choose_among_the_same_frames(tmp_path):
 def test_a_recording_can_be_read_twice(tmp_path):
     trial = recording(clip(tmp_path / "a.mkv", 4), clip(tmp_path / "b.mkv", 4))
     assert [numbers_of(f.views) for f in trial] == [numbers_of(f.views) for f in trial]
+
+
+def test_lenses_are_straightened_once_for_all_readings_and_anew_for_other_cameras(tmp_path, monkeypatch):
+    trial, made = recording(clip(tmp_path / "a.mkv", 4), clip(tmp_path / "b.mkv", 4)), []
+    monkeypatch.setattr(
+        recording_module, "undistortion_of", lambda camera: made.append(camera) or undistortion_of(camera)
+    )
+    list(trial)
+    list(replace(trial, start=2))
+    assert len(made) == 2
+    moved = replace(trial.rig["cam1"], K=trial.rig["cam1"].K * [[2], [2], [1]])
+    other = replace(trial, rig=Rig((moved, trial.rig["cam2"])))
+    assert next(iter(other)).views[0].camera.K[0, 0] == moved.K[0, 0]
+    assert len(made) == 3
 
 
 @pytest.fixture

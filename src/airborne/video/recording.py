@@ -41,6 +41,7 @@ class Recording:
     stop: int | None
     is_lazy: bool = False
     events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
+    _known: dict[tuple[str, bool], tuple[Camera, dict[int | None, Undistortion]]] = field(default_factory=dict)
 
     @property
     def rate(self) -> Fraction:
@@ -87,9 +88,17 @@ class Recording:
                     yield Frames(index, time_s, tuple(exposed))
 
     def _undistortions(self, camera: Camera, facts: VideoFacts) -> dict[int | None, Undistortion]:
-        """Return the undistortion of each kind of image in the file: whole (None), top field (0), bottom field (1)."""
+        """Return the undistortion of each kind of image in the file: whole (None), top field (0), bottom field (1).
+
+        They are found once for all readings of a recording.
+        """
         is_whole = facts.fields == "progressive" or self.fields_as == "interpolated"
-        return {parity: undistortion_of(camera if is_whole else camera.field(parity or 0)) for parity in facts.parities}
+        known = self._known.get((camera.name, is_whole))
+        if known is None or known[0] is not camera:
+            seen = {parity: camera if is_whole else camera.field(parity or 0) for parity in facts.parities}
+            known = camera, {parity: undistortion_of(each) for parity, each in seen.items()}
+            self._known[camera.name, is_whole] = known
+        return known[1]
 
     def _view(
         self,
