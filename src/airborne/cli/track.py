@@ -138,8 +138,7 @@ def _track(
                 first_frame=first_frame,
                 take=take,
                 progress=partial(report, f"tracking {trial.name}"),
-                find_progress=partial(report, "looking for the start"),
-                fit_progress=partial(report, "fitting the whole run"),
+                stage_progress=report,
             )
     except KeyboardInterrupt:
         if not any((output / table).is_file() for table in _FIRST_WRITTEN):

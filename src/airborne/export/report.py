@@ -42,7 +42,8 @@ _FIGURES = {  # titles and captions, in the order of the page
     "flight.png": (
         "Centre of mass and angular momentum",
         "Height of the centre of mass, and the angular momentum about it in world axes. In free flight the height is a "
-        "parabola and the momentum constant: how far they are from that checks the measurement.",
+        "parabola and the momentum constant: how far they are from that checks the measurement, the height only where "
+        "no whole run was fitted, which takes the fall as known.",
     ),
     "through_mask.png": (
         "Through the mask",
@@ -81,7 +82,7 @@ DEFINITIONS = {
     ),
     "Score": (
         "Root mean square colour difference between the images and the drawn body inside its outline, in grey levels "
-        "(0 to 255)."
+        "(0 to 255), as tracked frame by frame."
     ),
     "Status": (
         "Tracked: the images support the pose. Uncertain: the pose is a candidate that needs to be looked at. "
@@ -95,6 +96,7 @@ _JOINT_ANGLES = (
     "round limb's turn about its own axis, stays as it was and has an infinite standard deviation."
 )
 
+_SURFACES = {"skin": "a smooth skin", "ellipsoids": "the body's surface"}
 _UNCERTAINTY = (
     "Given as one standard deviation for each axis; bands in the figures are two. If errors are normal, 68% of them "
     "lie within one and 95% within two. Infinite means that the images do not show that direction."
@@ -124,6 +126,9 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     missing = sorted({"name", *headline(Motion.collect([]))} - set(summary))
     if missing:
         raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
+    if "whole_run" in summary and "method" in summary:
+        surface = _SURFACES[summary["whole_run"]]
+        summary = {**summary, "method": {**summary["method"], "whole_run": f"fitted by {surface}"}}
     path = folder / REPORT
     of_joints = {"Joint angles": _JOINT_ANGLES} if (figures_of(folder) / "joints.png").is_file() else {}
     uncertainty = {"Uncertainty": f"{_UNCERTAINTY} {summary.get('uncertainty', '')}"}

@@ -221,7 +221,7 @@ class BodyRun:
         return isinstance(settings, BodySettings) and settings.fits_whole_run and self.model.has_joints
 
     def finish(
-        self, folder: Path, drawn: OverlaysAs | None, progress: Progress | None
+        self, folder: Path, drawn: OverlaysAs | None, progress_of: Callable[[str], Progress | None]
     ) -> tuple[Motion, dict[str, Any]]:
         """Check the run, fit it and write the tables; return the motion and the beginning of the summary."""
         sort_rows(folder / self.table)
@@ -235,14 +235,16 @@ class BodyRun:
             self.calibration,
             is_preset=self.trial.body.file is None,
         )
-        fitted = self._fit_whole_run(folder, checked.motion, progress) if self._fits_whole_run else None
+        fitted = None
+        if self._fits_whole_run:
+            fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))
         motion = checked.motion if fitted is None else fitted.motion
         revise_motion(folder / self.table, motion)
         if checked.found is not None:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
         flight = write_tables(folder, motion, model)
         if drawn == "videos" and self._fits_whole_run:
-            self._draw_again(folder, drawn)
+            self._draw_again(folder, drawn, progress_of("drawing"))
         self.recording.events.extend(checked.doubts)
         is_exact = self.calibration is None
         return motion, {
@@ -264,7 +266,7 @@ class BodyRun:
             copy_motion(folder / self.table, folder / TRACKED_MOTION)
         return fitted
 
-    def _draw_again(self, folder: Path, drawn: OverlaysAs) -> None:
+    def _draw_again(self, folder: Path, drawn: OverlaysAs, progress: Progress | None) -> None:
         """Draw every time with the estimate that the run ended with."""
         estimates = {estimate.index: estimate for estimate in read_estimates(folder / self.table)}
         with ExitStack() as stack:
@@ -273,6 +275,8 @@ class BodyRun:
             for frames in Rereading(self.recording).forward(min(estimates), max(estimates) + 1):
                 if frames.index in estimates:
                     drawing.put(frames, estimates[frames.index])
+                if progress is not None:
+                    progress(frames.index - min(estimates) + 1, max(estimates) - min(estimates) + 1)
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: Motion) -> None:
         """Draw the figures and write the report."""

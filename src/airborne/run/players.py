@@ -113,7 +113,7 @@ class PlayersRun:
             artist.write(frames, self.players.joints, estimate.players)
 
     def finish(
-        self, folder: Path, drawn: OverlaysAs | None, progress: Progress | None
+        self, folder: Path, drawn: OverlaysAs | None, progress_of: Callable[[str], Progress | None]
     ) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
         motion = read_players(folder / self.table)

@@ -92,9 +92,12 @@ class Subject(Protocol[Found, AnyMotion]):
         ...
 
     def finish(
-        self, folder: Path, drawn: OverlaysAs | None, progress: Progress | None
+        self, folder: Path, drawn: OverlaysAs | None, progress_of: Callable[[str], Progress | None]
     ) -> tuple[AnyMotion, dict[str, Any]]:
-        """Write the other tables, and draw what the artists left; return the motion and the summary's beginning."""
+        """Write the other tables, and draw what the artists left; return the motion and the summary's beginning.
+
+        `progress_of` returns what a stage of that reports to.
+        """
         ...
 
     def warnings(self) -> list[str]:

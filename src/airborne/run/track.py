@@ -36,7 +36,7 @@ from airborne.run.self_check import alarms
 from airborne.run.subject import AnyMotion, Subject
 from airborne.tracking.tracker import Found
 from airborne.trial.file import Trial
-from airborne.types import Progress
+from airborne.types import Progress, StageProgress
 from airborne.video import LiveRecording, Outages
 
 
@@ -59,8 +59,7 @@ def track_trial(
     first_frame: bool = False,
     take: int | None = None,
     progress: Progress | None = None,
-    find_progress: Progress | None = None,
-    fit_progress: Progress | None = None,
+    stage_progress: StageProgress | None = None,
 ) -> TrackResult:
     """Track a trial, a body or players, and write the results into a folder.
 
@@ -70,8 +69,7 @@ def track_trial(
     behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
     `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
     `take` chooses one of the poses that were found, from 1, where the trial leaves its start to be found;
-    `find_progress` is called as the videos are looked through for it, `fit_progress` as a person's whole run is fitted
-    at the end; by default `progress` is.
+    `stage_progress` hears of what goes on before and after the frames are tracked, else `progress` does.
     Raises an AirborneError for input that cannot be used, and for a folder that holds another run.
     """
     if live and resume:
@@ -97,12 +95,13 @@ def track_trial(
     with sole_writer(folder), ExitStack() as stack:  # from the beginning: to find the start takes its time
         if trial.start.find:
             find = find_players_start if trial.has_players else find_start
-            found = find(trial, folder, take=take, progress=find_progress or progress)
+            looking = _of_stage("looking for the start", stage_progress, progress)
+            found = find(trial, folder, take=take, progress=looking)
             trial = found.trial
         if first_frame:
             trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
         drawn = None if not pictures else "stills" if first_frame else "videos"
-        options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress, fit_progress or progress)
+        options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress, stage_progress)
         facts = None if found is None else found.facts
         if trial.has_players:
             opened = _open_live(trial, stack, progress) if live else open_trial(trial, facts)
@@ -124,7 +123,7 @@ class _Options:
     drawn: OverlaysAs | None  # None: no pictures
     take: int | None  # of the poses that were found
     progress: Progress | None
-    fit_progress: Progress | None
+    stage_progress: StageProgress | None
 
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
@@ -137,7 +136,8 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     subject, delays_s = _track(subject, options, resume=goes_on)
     connection.close()
     tracked_s = time.monotonic()
-    motion, summary = subject.finish(folder, options.drawn, options.fit_progress)
+    args = options.stage_progress, options.progress
+    motion, summary = subject.finish(folder, options.drawn, lambda stage: _of_stage(stage, *args))
     summary |= corrections_of(subject.trial, motion.index.tolist())
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += [
@@ -164,6 +164,11 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     if options.drawn == "videos":
         subject.write_report(folder, summary, motion)
     return TrackResult(motion, summary)
+
+
+def _of_stage(stage: str, report: StageProgress | None, otherwise: Progress | None) -> Progress | None:
+    """Return what a stage reports its progress to."""
+    return otherwise if report is None else partial(report, stage)
 
 
 def _open_live(trial: Trial, stack: ExitStack, progress: Progress | None) -> Opened[LiveRecording]:

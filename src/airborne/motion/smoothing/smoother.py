@@ -41,7 +41,7 @@ CENTRE_OF_MASS = "centre_of_mass"
 _DESCRIPTIONS = {
     "butterworth": "zero-lag Butterworth low-pass, second order forward and back, -3 dB of both at {cutoff:g} Hz",
     "spline": "cubic smoothing spline by generalised cross-validation, weighted by 1 / variance",
-    "kalman": "Kalman smoother with white-noise jerk, its density by maximum likelihood, and the tracker's covariances",
+    "kalman": "Kalman smoother with white-noise jerk, its density by maximum likelihood, and the run's covariances",
 }
 _FILLED_BY = {
     "butterworth": "a cubic spline through the known frames",

@@ -215,8 +215,8 @@ class _Panel:
             left = f", about {(command.seconds - self._begun_s) / n_own * (n_frames - n_done):.0f} s left"
         self.bar.value = n_done / max(n_frames, 1)
         said = command.progress()
-        is_another = said.startswith("fitting") or (not n_done and said.startswith("looking"))  # stage than tracking
-        stage = said if is_another else describe_progress(n_done, n_frames)
+        is_other = said.startswith(("fitting", "drawing")) or (not n_done and said.startswith("looking"))
+        stage = said if is_other else describe_progress(n_done, n_frames)
         self.says.text = f"{stage}, {command.seconds:.0f} s{left}"
 
     def _say_end(self, command: Command) -> None:
