@@ -15,7 +15,7 @@ _WAYS = {
     **dict.fromkeys(("stepping", "simplex"), _COMPARED),
     "blocker": "by fitting a model of each player's legs to the images of all cameras, frame by frame",
 }
-_SURFACES = {"skin": "a smooth skin of the body", "ellipsoids": "the same model"}
+SURFACES = {"skin": "a smooth skin of the body", "ellipsoids": "the same model"}  # of the fit of a whole run
 _PARTICLES = "with particle filters on the colours of the players' legs"
 
 
@@ -28,7 +28,7 @@ def describe_methods(summary: Mapping[str, Any]) -> str:
         f"{what} was measured from the videos of {count(len(cameras), 'calibrated camera')}, without markers, with "
         f"Airborne {versions.get('airborne', '')} (method '{method}'), {_WAYS.get(method, _PARTICLES)}."
     ]
-    if surface := _SURFACES.get(summary.get("whole_run", "")):
+    if surface := SURFACES.get(summary.get("whole_run", "")):
         text.append(
             f"The poses of all frames were then fitted together to the images, by {surface}, with smooth accelerations "
             "and, in flight, a centre of mass that falls freely."

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from airborne.errors import ResultError
+from airborne.export.methods_text import SURFACES
 from airborne.export.page import UNKNOWN_TEXT, HtmlTable, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.export.viewer import Viewer
@@ -96,7 +97,6 @@ _JOINT_ANGLES = (
     "round limb's turn about its own axis, stays as it was and has an infinite standard deviation."
 )
 
-_SURFACES = {"skin": "a smooth skin", "ellipsoids": "the body's surface"}
 _UNCERTAINTY = (
     "Given as one standard deviation for each axis; bands in the figures are two. If errors are normal, 68% of them "
     "lie within one and 95% within two. Infinite means that the images do not show that direction."
@@ -127,7 +127,7 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     if missing:
         raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
     if "whole_run" in summary and "method" in summary:
-        surface = _SURFACES[summary["whole_run"]]
+        surface = SURFACES[summary["whole_run"]]
         summary = {**summary, "method": {**summary["method"], "whole_run": f"fitted by {surface}"}}
     path = folder / REPORT
     of_joints = {"Joint angles": _JOINT_ANGLES} if (figures_of(folder) / "joints.png").is_file() else {}

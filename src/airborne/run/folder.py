@@ -171,24 +171,6 @@ def holds_run_of(trial: Trial, folder: Path) -> bool:
     return record.is_file() and read_record(record) == run_identity(trial)
 
 
-def require_run_of(trial: Trial, folder: Path) -> None:
-    """Raise ResultError where a folder's run was not tracked from the files and masks of this trial.
-
-    Settings of the tracking and keys may be others. So may be the start, if the trial leaves it to be found.
-    """
-    recorded, now = read_record(folder / RUN_RECORD), run_identity(trial)
-    inputs = [dict(each.get("inputs", {})) for each in (recorded, now)]
-    if trial.start.find:
-        for each in inputs:
-            each.pop(_START_AND_LIGHTS, None)
-    differing = [name for name in {**inputs[0], **inputs[1]} if inputs[0].get(name) != inputs[1].get(name)]
-    differing += ["masks"] * (recorded.get("masks", []) != now["masks"])
-    if differing:
-        raise ResultError(
-            f"{folder} holds a run of another trial (other {', '.join(differing)}); give that which it was tracked from"
-        )
-
-
 def recorded_take(folder: Path) -> int | None:
     """Return which of the poses that were found the run in a folder was told to take; None where it was told none."""
     record = folder / RUN_RECORD

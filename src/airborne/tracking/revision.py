@@ -107,5 +107,4 @@ def _release(held: Sequence[FrameRecord], write: Callable[[Estimate], None]) -> 
 
 
 def _most_held(frames: Frames) -> int:
-    n_bytes = sum(3 * view.camera.size[0] * view.camera.size[1] for view in frames.views if view is not None)
-    return int(_MOST_BYTES // max(n_bytes, 1))
+    return int(_MOST_BYTES // max(frames.n_bytes, 1))

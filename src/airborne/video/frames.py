@@ -56,3 +56,8 @@ class Frames:
     index: int  # frame or field number, from 0
     time_s: Fraction  # exact time on the trial's clock [s]
     views: tuple[View | None, ...]  # in the rig's order
+
+    @property
+    def n_bytes(self) -> int:
+        """How many bytes the images take, converted."""
+        return sum(3 * view.camera.size[0] * view.camera.size[1] for view in self.views if view is not None)
