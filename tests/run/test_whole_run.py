@@ -18,7 +18,8 @@ from airborne.synthetic import somersault_scene, write_trial
 from airborne.tracking import Estimate, Status
 from airborne.trial.file import read_trial
 from airborne.video.rereading import Rereading
-from tests.support.commands import in_process
+from tests.support.commands import in_process, refusal
+from tests.support.run_files import contents_of
 
 N, SCALE = 13, 4
 OFF_M, OFF_RAD = 0.01, 0.05  # by which poses are wrong in every frame, in each direction
@@ -133,6 +134,16 @@ def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked
     assert in_process("track", run.file, "-o", again, "--no-pictures", "--resume") == 0
     for name in (MOTION, JOINTS, TRACKED_MOTION):
         assert (again / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_a_refused_resume_leaves_a_fitted_run_as_it_is(run, tmp_path, capsys):
+    folder, other = tmp_path / "run", run.file.with_name("other.toml")
+    assert in_process("track", run.file, "-o", folder, "--no-pictures") == 0
+    before = contents_of(folder)
+    text = run.file.read_text(encoding="utf-8")
+    other.write_text(text.replace("[track]\n", '[track]\nprediction = "none"\n'), encoding="utf-8")
+    assert "holds another run" in refusal(capsys, "track", other, "-o", folder, "--no-pictures", "--resume")
+    assert contents_of(folder) == before
 
 
 def test_a_trial_may_leave_poses_as_they_are_tracked(run, tmp_path):

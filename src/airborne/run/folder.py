@@ -77,22 +77,25 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
-    if table == MOTION and (folder / TRACKED_MOTION).is_file():  # a run goes on from what was tracked
-        copy_motion(folder / TRACKED_MOTION, rows)
-        remove_motion(folder / TRACKED_MOTION)
     recorded = _with_keys(read_record(record), identity)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
-    if table == MOTION and changed and set(changed) <= {"keys", "masks"}:
-        again = stretches_between(recorded, identity)
-        drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
-        (folder / SUMMARY).unlink(missing_ok=True)  # it is not finished until they are tracked again
-        write_json(record, identity)
-    elif changed:
+    is_corrected = table == MOTION and bool(changed) and set(changed) <= {"keys", "masks"}
+    if changed and not is_corrected:
         differences = "; ".join(_describe_change(name, recorded, identity) for name in changed)
         raise ResultError(
             f"{folder} holds another run ({differences}); "
             "go on with its options and files, or track into another folder"
         )
+    tracked = folder / TRACKED_MOTION
+    if is_corrected or tracked.is_file():
+        (folder / SUMMARY).unlink(missing_ok=True)  # it is not finished until it is tracked, and fitted, again
+    if tracked.is_file():  # a run goes on from what was tracked
+        copy_motion(tracked, rows)
+        remove_motion(tracked)
+    if is_corrected:
+        again = stretches_between(recorded, identity)
+        drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
+        write_json(record, identity)
     return True
 
 
