@@ -16,7 +16,9 @@ import llvmlite.binding as llvm
 from numba import config, njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import PassManager
 
+from airborne.kernels.borrowing import kernel_passes
 from airborne.kernels.cache import KernelCache
 
 
@@ -99,7 +101,10 @@ _ENVIRONMENT = "_ZN08NumbaEnv"
 
 
 class _Compiler(Compiler):
-    """Numba's compiler, with libraries of our own."""
+    """Numba's compiler, with a pass and libraries of our own."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        return [kernel_passes(self.state)]
 
     def compile_extra(self, func: Callable) -> Any:
         library = _InnerLibrary if self.state.flags.no_cpython_wrapper else _Library
