@@ -39,7 +39,7 @@ def test_narrowed_region_is_a_crop_of_the_region_that_holds_the_body_and_the_mar
     wide = regions(posed_cross(0), posed_cross(6))
     for region, narrow in zip(wide, narrow_regions(wide, [body], FLAT_CROSS, margin_px), strict=True):
         assert narrow.rgb.size < region.rgb.size
-        np.testing.assert_array_equal(narrow.rgb, narrow.crop(region.view_rgb))
+        np.testing.assert_array_equal(narrow.rgb, narrow.crop(region.view.rgb))
         px, there = (each.camera.px_from_world(bounding_points(body, FLAT_CROSS)) for each in (narrow, region))
         np.testing.assert_allclose(px + narrow.corner, there + region.corner, atol=ROUNDTRIP)
         assert np.all(px.min(axis=0) >= margin_px)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from airborne.appearance.background import BackgroundModel, BackgroundPixels
 from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, posterior
 from airborne.cameras import Camera
+from airborne.video import View
 
 _COLOUR_RATE = 0.1  # share of the newest frame in the colour histograms
 _SAMPLES = 2000  # pixels of a region that are counted, about
@@ -26,7 +27,7 @@ class Region:
     camera: Camera
     corner: tuple[int, int]  # (x0, y0) of the region in its view
     rgb: NDArray[np.uint8]  # (h, w, 3)
-    view_rgb: NDArray[np.uint8]  # (H, W, 3) the whole view
+    view: View  # the whole one
     source: tuple[str, bytes]  # camera name and intrinsics: views that share them show the scene by the same pixels
     packed_view: NDArray[np.float64]  # (18,) of `pack_view`
     exposure_s: float = 0.0  # of the view
@@ -87,9 +88,10 @@ class Appearance:
             known = self.backgrounds.get(region.source, BackgroundModel())
             background = known.learn(region.rgb, covered, region.corner)
         else:
-            everywhere = np.zeros(region.view_rgb.shape[:2], bool)
+            rgb = region.view.rgb
+            everywhere = np.zeros(rgb.shape[:2], bool)
             region.crop(everywhere)[:] = covered
-            background = BackgroundModel().learn(region.view_rgb, everywhere, (0, 0))
+            background = BackgroundModel().learn(rgb, everywhere, (0, 0))
         return replace(self, backgrounds={**self.backgrounds, region.source: background})
 
     def background_pixels(self, region: Region) -> BackgroundPixels:

@@ -67,7 +67,7 @@ def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opene
         every=trial.track.every,
         start=trial.start.frame,
         stop=trial.track.stop,
-        lazy=trial.has_players,
+        lazy=True,
     )
     recording.events.extend(cameras.notes)
     return Opened(recording, cameras.calibration, cameras.detections)

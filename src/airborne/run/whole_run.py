@@ -21,6 +21,7 @@ from airborne.errors import ResultError
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import falls_freely
 from airborne.motion.flight.phases import body_events
+from airborne.motion.smoothing.lost_limbs import bridge_lost_limbs, forget_moved_limbs
 from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run, invert_known, smooth_covariances
 from airborne.motion.smoothing.segments import segment_numbers, stretches
 from airborne.tracking import Estimate, Status
@@ -72,13 +73,16 @@ def fit_whole_run(
     )
     for window in windows:
         rows, time_s = window.rows, motion.time_s[window.rows]
-        fit = fit_run(model, [motion.pose(row) for row in rows], time_s, window.stretches, _Look(images, window))
+        poses = [motion.pose(row) for row in rows]
+        start = bridge_lost_limbs(model, poses, time_s, motion.covariance[rows], window.stretches)
+        fit = fit_run(model, start, time_s, window.stretches, _Look(images, window))
         covariances = smooth_covariances(model, fit, time_s, window.stretches, motion.covariance[rows])
         for row, pose, each in list(zip(rows, fit.poses, covariances, strict=True))[window.kept]:
             matrix = pose.world_from_root.as_matrix()
             position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
             covariance[row] = each
     fitted = replace(motion, position=position, R=R, joint_angles=angles, covariance=covariance)
+    fitted = forget_moved_limbs(model, motion, fitted)
     return FittedRun(fitted, "skin" if images.is_skin else "ellipsoids")
 
 

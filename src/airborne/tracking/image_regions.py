@@ -134,8 +134,8 @@ def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
     return Region(
         camera=camera.resample(scale=(1, 1), offset=(x0, y0), size=(width, height)),
         corner=(x0, y0),
-        rgb=np.ascontiguousarray(view.rgb[y0 : y0 + height, x0 : x0 + width]),
-        view_rgb=view.rgb,
+        rgb=np.ascontiguousarray(view.crop((x0, y0, x0 + width, y0 + height))),
+        view=view,
         source=(camera.name, camera.K.tobytes()),
         packed_view=shift_view(packed, x0, y0),
         exposure_s=view.exposure_s,

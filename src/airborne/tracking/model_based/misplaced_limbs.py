@@ -27,7 +27,7 @@ _ROUNDS = ((512, 24), (512, 16), (512, 5))  # proposals, survivors; the sds are 
 _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
 DISTINCT_M = 0.1  # two places of a limb, of which some joint is this far apart: about the width of an arm
-_SAME_M = 0.02  # fits from two places of a limb that are no further apart end in the same
+SAME_M = 0.02  # fits from two places of a limb that are no further apart end in the same
 _FEWEST_PX = 25  # a segment with fewer visible pixels in a view is occluded there, not misplaced
 _MISPLACED = 0.5  # share of the body's precision, below which a segment is misplaced
 
@@ -87,15 +87,6 @@ def limb_distance(model: BodyModel, pose: Pose, other: Pose, limb: NDArray[np.in
     bodies = [model.with_pose(each) for each in (pose, other)]
     points = [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]
     return float(np.linalg.norm(points[0] - points[1], axis=1).max())
-
-
-def drop_same_places(model: BodyModel, poses: Sequence[Pose], limb: NDArray[np.int64]) -> list[Pose]:
-    """Return the poses without those that have a limb where one before has it."""
-    kept = list[Pose]()
-    for pose in poses:
-        if all(limb_distance(model, pose, other, limb) > _SAME_M for other in kept):
-            kept.append(pose)
-    return kept
 
 
 def with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:

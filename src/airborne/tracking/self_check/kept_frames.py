@@ -22,8 +22,7 @@ class KeptFrames:
     def add(self, frames: Frames) -> None:
         """Keep the frames, or not."""
         if self._kept is None:
-            size = sum(view.rgb.nbytes for view in frames.views if view is not None)
-            self._kept = EvenSample(int(np.clip(_MOST_BYTES / max(size, 1), _FEWEST_KEPT, _MOST_KEPT)))
+            self._kept = EvenSample(int(np.clip(_MOST_BYTES / max(frames.n_bytes, 1), _FEWEST_KEPT, _MOST_KEPT)))
         self._kept.offer(lambda: frames)
 
     def __iter__(self) -> Iterator[Frames]:

@@ -1,0 +1,100 @@
+"""Limbs that were lost for some frames: where they may be, between where they were and where they were found again.
+
+A tracker that loses a limb may see it somewhere else, in frames in which it says that it does not know the limb. The
+images of such a frame agree with that place well enough that a fit of the whole run stays there, and draws the frames
+beside along. So the fit starts from the shortest way between the frames that know the limb.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from airborne.body import BodyModel, Pose
+from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
+from airborne.motion.joints import landmarks
+from airborne.motion.motion import Motion
+from airborne.motion.smoothing.run_fit import Stretch
+from airborne.tracking.model_based.degrees_of_freedom import joints_of, limbs_of
+from airborne.tracking.model_based.misplaced_limbs import DISTINCT_M
+from airborne.tracking.model_based.support import mark_unobserved
+from airborne.types import Array
+
+_CONTRADICTED_SDS = 3.0 * np.sqrt(3.0)  # three along one axis, as sds are root mean squares over three
+
+
+def bridge_lost_limbs(
+    model: BodyModel, poses: Sequence[Pose], time_s: Array, covariances: Array, stretches: Sequence[Stretch]
+) -> list[Pose]:
+    """Return the poses (n,) at the times [s], with limbs that jump while unknown on the way between known frames.
+
+    A limb is unknown where a variance of its joints (covariances (n, d, d)) is not finite. It jumps where some joint
+    of it is further than `DISTINCT_M` from midway between where it is in the frames before and after.
+    """
+    bridged = list(poses)
+    for limb in limbs_of(model):
+        columns = joints_of(model, limb).columns
+        is_known = np.isfinite(covariances[:, columns, columns]).all(axis=1)
+        for stretch in stretches:
+            for gap in _gaps(is_known, stretch.rows):
+                around = slice(max(gap.start - 2, stretch.rows.start), min(gap.stop + 2, stretch.rows.stop))
+                others = list(bridged)
+                others[gap] = _between(bridged, time_s, gap, limb)
+                if _jumps(model, bridged[around], limb) and not _jumps(model, others[around], limb):
+                    bridged = others
+    return bridged
+
+
+def forget_moved_limbs(model: BodyModel, tracked: Motion, fitted: Motion) -> Motion:
+    """Return the fitted motion, without knowledge of limbs that are not where they were tracked.
+
+    A fit that moves some landmark of a limb by more than `DISTINCT_M` and by more than three sds contradicts the
+    tracker: one of them is wrong.
+    """
+    (before, sd), (after, _) = landmarks(tracked, model), landmarks(fitted, model)
+    contradicts = np.linalg.norm(after - before, axis=-1) > np.maximum(DISTINCT_M, _CONTRADICTED_SDS * sd)
+    owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
+    covariance = fitted.covariance.copy()
+    for limb in limbs_of(model):
+        columns = joints_of(model, limb).columns
+        for row in np.flatnonzero(contradicts[:, np.isin(owners, limb)].any(axis=1)):
+            covariance[row] = mark_unobserved(covariance[row], columns)
+    return replace(fitted, covariance=covariance)
+
+
+def _gaps(is_known: NDArray[np.bool_], rows: slice) -> Iterator[slice]:
+    """Yield the rows that are not known on end, between two of a stretch that are."""
+    known = np.flatnonzero(is_known[rows]) + rows.start
+    for before, after in zip(known[:-1].tolist(), known[1:].tolist(), strict=True):
+        if after - before > 1:
+            yield slice(before + 1, after)
+
+
+def _between(poses: Sequence[Pose], time_s: Array, gap: slice, limb: NDArray[np.int64]) -> list[Pose]:
+    """Return the poses of a gap with the limb's joints turned at a constant rate from the pose before to that after."""
+    joints, ends = limb - 1, [gap.start - 1, gap.stop]
+    angles = np.array([pose.joint_angles for pose in poses[gap]])
+    R = np.array([matrix_from_angles(poses[end].joint_angles[joints]) for end in ends])
+    for i, joint in enumerate(joints):
+        path = Slerp(time_s[ends], Rotation.from_matrix(R[:, i]))
+        angles[:, joint] = angles_from_matrix(path(time_s[gap]).as_matrix())
+    return [replace(pose, joint_angles=each) for pose, each in zip(poses[gap], angles, strict=True)]
+
+
+def _jumps(model: BodyModel, poses: Sequence[Pose], limb: NDArray[np.int64]) -> bool:
+    """Whether a limb leaves its way from frame to frame, relative to the segment that it hangs on."""
+    if len(poses) < 3:
+        return False
+    parent = int(model.parents[limb[0]])
+    is_mark = np.isin([model.index_of(landmark.segment) for landmark in model.landmarks], limb)
+    bodies = [model.with_pose(pose) for pose in poses]
+    points = np.array([np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies])
+    points = np.array(
+        [(each - body.t[parent]) @ body.R[parent] for each, body in zip(points, bodies, strict=True)]
+    )  # in the parent's axes
+    off = points[1:-1] - (points[:-2] + points[2:]) / 2
+    return bool(np.linalg.norm(off, axis=2).max() > DISTINCT_M)
