@@ -44,6 +44,24 @@ def test_lost_limb_starts_from_its_way_between_the_frames_that_know_it(rows):
     assert all(bridged[row] is poses[row] for row in range(N) if row not in rows)
 
 
+def test_unknown_frames_before_and_after_the_jumps_stay():
+    poses, covariances = lose([8, 9, 10])
+    for row in (6, 7, 11, 12):
+        covariances[row, COLUMNS, COLUMNS] = np.inf
+    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE)
+    assert off_m(bridged) < 0.02
+    assert [row for row in range(N) if bridged[row] is not poses[row]] == [8, 9, 10]
+
+
+def test_limb_that_jumps_back_from_where_it_was_led_is_led_anew_all_the_way():
+    poses, covariances = list(TRUTH), lose(range(6, 12))[1]
+    for row, turned_rad in zip(range(6, 12), np.linspace(0.1, 1.4, 6), strict=True):
+        poses[row] = lose([row], turned_rad)[0][row]
+    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE)
+    assert off_m(poses) > 0.4
+    assert off_m(bridged) < 0.05
+
+
 def test_limb_that_is_known_or_does_not_jump_stays_where_it_was_tracked():
     for poses, covariances in (lose([8, 9], is_known=True), lose([8, 9], turned_rad=0.1)):
         assert bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE) == poses

@@ -30,10 +30,11 @@ _CONTRADICTED_SDS = 3.0 * np.sqrt(3.0)  # three along one axis, as sds are root 
 def bridge_lost_limbs(
     model: BodyModel, poses: Sequence[Pose], time_s: Array, covariances: Array, stretches: Sequence[Stretch]
 ) -> list[Pose]:
-    """Return the poses (n,) at the times [s], with limbs that jump while unknown on the way between known frames.
+    """Return the poses (n,) at the times [s], with limbs that jump while unknown on the way between other frames.
 
     A limb is unknown where a variance of its joints (covariances (n, d, d)) is not finite. It jumps where some joint
-    of it is further than `DISTINCT_M` from midway between where it is in the frames before and after.
+    of it is further than `DISTINCT_M` from midway between where it is in the frames before and after. Unknown frames
+    to which it does not jump from known ones stay as they are.
     """
     bridged = list(poses)
     for limb in limbs_of(model):
@@ -42,10 +43,12 @@ def bridge_lost_limbs(
         for stretch in stretches:
             for gap in _gaps(is_known, stretch.rows):
                 around = slice(max(gap.start - 2, stretch.rows.start), min(gap.stop + 2, stretch.rows.stop))
-                others = list(bridged)
-                others[gap] = _between(bridged, time_s, gap, limb)
-                if _jumps(model, bridged[around], limb) and not _jumps(model, others[around], limb):
-                    bridged = others
+                jumps = np.flatnonzero(_jumps(_places(model, bridged[around], limb))) + around.start + 1
+                lost = _between_jumps(jumps, gap)
+                if lost.start < lost.stop:
+                    others = [*bridged[: lost.start], *_way(bridged, time_s, lost, limb), *bridged[lost.stop :]]
+                    if not _jumps(_places(model, others[around], limb)).any():
+                        bridged = others
     return bridged
 
 
@@ -74,7 +77,18 @@ def _gaps(is_known: NDArray[np.bool_], rows: slice) -> Iterator[slice]:
             yield slice(before + 1, after)
 
 
-def _between(poses: Sequence[Pose], time_s: Array, gap: slice, limb: NDArray[np.int64]) -> list[Pose]:
+def _between_jumps(jumps: NDArray[np.intp], gap: slice) -> slice:
+    """Return the rows of a gap from which a limb comes back by a jump; all of it where there is no coming back.
+
+    A row that is right counts as a jump beside one that is not.
+    """
+    if not len(jumps):
+        return slice(0, 0)
+    first, last = int(jumps[0]) + 1, int(jumps[-1]) - 1
+    return slice(max(first, gap.start), min(last + 1, gap.stop)) if first <= last else gap
+
+
+def _way(poses: Sequence[Pose], time_s: Array, gap: slice, limb: NDArray[np.int64]) -> list[Pose]:
     """Return the poses of a gap with the limb's joints turned at a constant rate from the pose before to that after."""
     joints, ends = limb - 1, [gap.start - 1, gap.stop]
     angles = np.array([pose.joint_angles for pose in poses[gap]])
@@ -85,16 +99,16 @@ def _between(poses: Sequence[Pose], time_s: Array, gap: slice, limb: NDArray[np.
     return [replace(pose, joint_angles=each) for pose, each in zip(poses[gap], angles, strict=True)]
 
 
-def _jumps(model: BodyModel, poses: Sequence[Pose], limb: NDArray[np.int64]) -> bool:
-    """Whether a limb leaves its way from frame to frame, relative to the segment that it hangs on."""
-    if len(poses) < 3:
-        return False
+def _places(model: BodyModel, poses: Sequence[Pose], limb: NDArray[np.int64]) -> Array:
+    """Return where a limb's joints and landmarks are, in the axes of the segment that it hangs on: (n, points, 3)."""
     parent = int(model.parents[limb[0]])
     is_mark = np.isin([model.index_of(landmark.segment) for landmark in model.landmarks], limb)
     bodies = [model.with_pose(pose) for pose in poses]
-    points = np.array([np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies])
-    points = np.array(
-        [(each - body.t[parent]) @ body.R[parent] for each, body in zip(points, bodies, strict=True)]
-    )  # in the parent's axes
-    off = points[1:-1] - (points[:-2] + points[2:]) / 2
-    return bool(np.linalg.norm(off, axis=2).max() > DISTINCT_M)
+    points = [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]
+    return np.array([(each - body.t[parent]) @ body.R[parent] for each, body in zip(points, bodies, strict=True)])
+
+
+def _jumps(places: Array) -> NDArray[np.bool_]:
+    """Say of which rows, but the first and the last, a limb is off the middle of those before and after: (n - 2,)."""
+    off = places[1:-1] - (places[:-2] + places[2:]) / 2
+    return np.linalg.norm(off, axis=2).max(axis=1, initial=0.0) > DISTINCT_M

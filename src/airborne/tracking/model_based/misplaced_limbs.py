@@ -23,7 +23,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
 _N_FIRST = 24  # survivors of the starts
-_ROUNDS = ((512, 24), (512, 16), (512, 5))  # proposals, survivors; the sds are halved in each round
+_ROUNDS = ((512, 24), (512, 16), (512, 3))  # proposals, survivors; the sds are halved in each round
 _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
 DISTINCT_M = 0.1  # two places of a limb, of which some joint is this far apart: about the width of an arm
@@ -113,10 +113,11 @@ class _LimbSearch:
         R, t = self.model.pose_segments(R, t, angles)
         scores = mask_evidence(self.surface, self.maps, R, t).sum(axis=1)
         left, best = np.argsort(-scores, kind="stable"), []
+        places = t[left][:, self.limb]
         while len(left) and len(best) < n:
             best.append(left[0])
-            away_m = np.linalg.norm(t[left][:, self.limb] - t[left[0], self.limb], axis=-1).max(axis=1)
-            left = left[away_m > DISTINCT_M]
+            is_away = (((places - places[0]) ** 2).sum(axis=2) > DISTINCT_M**2).any(axis=1)
+            left, places = left[is_away], places[is_away]
         return angles[best]
 
 
