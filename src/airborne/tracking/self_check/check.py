@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,12 +29,13 @@ from airborne.tracking.self_check.nuisances import (
     widen,
 )
 from airborne.tracking.self_check.path import TrackedPath
-from airborne.tracking.self_check.registration import draw_silhouette, foreground, outline_of, register
+from airborne.tracking.self_check.registration import Silhouette, draw_silhouette, foreground, outline_of, register
 from airborne.tracking.self_check.solution import Evidence, NuisanceSolution, PoseErrors, pose_errors, solve
-from airborne.types import Array
+from airborne.types import Array, Image
 from airborne.video import Frames
 
 _MOST_MOMENTS = 16  # at which silhouettes are registered
+_N_THREADS = min(os.cpu_count() or 1, 4)  # register silhouettes; OpenCV lets go of Python's lock, half of the time
 _FEWEST_MOMENTS = 3  # with fewer, nothing is said of causes
 
 STAYED = "what the body covered at its start, and does not cover any more, looks as it did then"
@@ -179,28 +182,39 @@ def _gather(
         edge=np.zeros((n, c, 6, 6)),
         edge_by_parameter=np.zeros((n, c, 6, k)),
     )
-    empty = EmptyScenes(kept, render_model, path)
-    for i, (row, frames) in enumerate(zip(rows, moments, strict=True)):
-        velocity = path.velocity(row)
-        for j, view in enumerate(frames.views):
-            if view is None:
-                continue
-            posed = render_model.with_pose(path.pose_after(row, view.delay_s))
-            silhouette = draw_silhouette(render_model, posed, view.camera)
-            if silhouette is None:
-                continue
-            outline = outline_of(silhouette, posed)
-            columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
-            evidence.edge[i, j] = outline.edge
-            evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
-            scene = empty.behind(j, view, silhouette) if silhouette.is_whole else None
-            offset = None if scene is None else register(silhouette, foreground(view.rgb, scene, silhouette))
-            if offset is not None and scene is not None and not render_model.model.has_joints:
-                offset = register_light(silhouette, offset, view.rgb, scene)
-            if offset is not None:
-                evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = offset, outline.by_twist, True
+    empty, registered = EmptyScenes(kept, render_model, path), dict[tuple[int, int], Future[Array | None]]()
+    with ThreadPoolExecutor(_N_THREADS) as pool:
+        for i, (row, frames) in enumerate(zip(rows, moments, strict=True)):
+            velocity = path.velocity(row)
+            for j, view in enumerate(frames.views):
+                if view is None:
+                    continue
+                posed = render_model.with_pose(path.pose_after(row, view.delay_s))
+                silhouette = draw_silhouette(render_model, posed, view.camera)
+                if silhouette is None:
+                    continue
+                outline = outline_of(silhouette, posed)
+                columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
+                evidence.edge[i, j] = outline.edge
+                evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
+                evidence.by_twist[i, j] = outline.by_twist
                 evidence.by_parameter[i, j] = outline.by_twist @ columns + shifts
+                scene = empty.behind(j, view, silhouette) if silhouette.is_whole else None
+                if scene is not None:
+                    in_light = not render_model.model.has_joints
+                    registered[i, j] = pool.submit(_register, silhouette, view.rgb, scene, in_light=in_light)
+    for (i, j), found in registered.items():
+        if (offset := found.result()) is not None:
+            evidence.offset[i, j], evidence.is_seen[i, j] = offset, True
+    for each in (evidence.by_twist, evidence.by_parameter):
+        each[~evidence.is_seen] = 0.0
     return evidence
+
+
+def _register(silhouette: Silhouette, rgb: Image, scene: Image, *, in_light: bool) -> Array | None:
+    """Return the offset (4,) of a silhouette in an image, refined by its light or not; None where it is not found."""
+    offset = register(silhouette, foreground(rgb, scene, silhouette))
+    return offset if offset is None or not in_light else register_light(silhouette, offset, rgb, scene)
 
 
 def _with_fall(
