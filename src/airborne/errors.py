@@ -81,6 +81,7 @@ _PLAIN = {
     "extra_forbidden": "unknown key",
     "float_parsing": "expected a number",
     "int_parsing": "expected a whole number",
+    "bool_type": "expected true or false",
 }
 _BOUNDS = {  # pydantic's kinds of error: where it keeps the bound, and how it is said
     "greater_than_equal": ("ge", "expected {:g} or more"),

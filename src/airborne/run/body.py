@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
@@ -225,7 +226,7 @@ class BodyRun:
     ) -> tuple[Motion, dict[str, Any]]:
         """Check the run, fit it and write the tables; return the motion and the beginning of the summary."""
         sort_rows(folder / self.table)
-        motion, model = read_motion(folder / self.table), self.model
+        motion, model, begun_s = read_motion(folder / self.table), self.model, time.monotonic()
         checked = check_run(
             motion,
             model,
@@ -235,9 +236,10 @@ class BodyRun:
             self.calibration,
             is_preset=self.trial.body.file is None,
         )
-        fitted = None
+        fitted, timings_s = None, {"self_check": time.monotonic() - begun_s}
         if self._fits_whole_run:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))
+            timings_s["whole_run"] = time.monotonic() - begun_s - timings_s["self_check"]
         motion = checked.motion if fitted is None else fitted.motion
         revise_motion(folder / self.table, motion)
         if checked.found is not None:
@@ -254,6 +256,7 @@ class BodyRun:
             **({} if fitted is None else {"whole_run": fitted.surface}),
             "self_check": checked.findings,
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
+            "timings_s": timings_s,
         }
 
     def _fit_whole_run(self, folder: Path, motion: Motion, progress: Progress | None) -> FittedRun | None:

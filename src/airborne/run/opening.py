@@ -54,20 +54,21 @@ class Opened(Generic[AnyRecording]):
 def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opened[Recording]:
     """Open a trial's videos with its cameras, fields as its method takes them.
 
-    Images of players are decoded lazily: only the regions that are used. `facts` are the videos', where `inspect` has
-    been called before.
+    Images are converted lazily, only in the regions that are used, but for fields whose missing rows are interpolated.
+    `facts` are the videos', where `inspect` has been called before.
     """
+    fields_as = "rows" if trial.has_players else FIELD_MODES[trial.settings.method]
     sources = [video_source(trial, camera) for camera in trial.camera]
     cameras = open_cameras(trial, facts)
     recording = open_recording(
         sources,
         cameras.rig,
         facts=cameras.facts,
-        fields_as="rows" if trial.has_players else FIELD_MODES[trial.settings.method],
+        fields_as=fields_as,
         every=trial.track.every,
         start=trial.start.frame,
         stop=trial.track.stop,
-        lazy=True,
+        lazy=fields_as == "rows",
     )
     recording.events.extend(cameras.notes)
     return Opened(recording, cameras.calibration, cameras.detections)

@@ -154,10 +154,12 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
             "median_delay_s": float(np.median(delays_s)),
             "largest_delay_s": max(delays_s),
         }
+    stages_s = summary.pop("timings_s", {})  # of finishing
     summary["timings_s"] = {
         "opening": read_s - options.started_s,
         "tracking": tracked_s - read_s,
-        "writing": time.monotonic() - tracked_s,
+        **stages_s,
+        "writing": time.monotonic() - tracked_s - sum(stages_s.values()),
         "tracking_a_frame": (tracked_s - read_s) / len(motion),
     }
     write_json(folder / SUMMARY, summary)

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pixel = Annotated[list[float], Field(min_length=2, max_length=2)]
+Switch = Annotated[bool, Field(strict=True)]  # true or false, no number and no text
 ClickTable = dict[str, dict[str, Pixel]]  # point -> camera -> u, v
 
 

@@ -192,6 +192,8 @@ class ClickPanel(PointsPanel):
         start: dict[str, Any] = {"frame": self.frame, "points_px": self.file}
         if self.is_by_hand and self.hand.pose is not None:
             start = start_from_pose(self.model, self.frame, self.hand.pose)
+            if start != self.kept:  # a drag that is still going on: what is written is what is kept
+                self.take_pose(self.says)
         with show_errors():
             write_start(self.session, start)
             ui.notify("the first pose is written into the trial", type="positive")
