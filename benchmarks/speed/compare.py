@@ -1,9 +1,10 @@
 """Is this tree faster or slower than another revision? `python benchmarks/speed/compare.py REV [--only ROAD ...]`.
 
 Both are timed in turns in one run, each in a process of its own on one thread, so that a machine that slows down slows
-both. Roads: `thing` tracks the bundled example and `person` a synthetic somersault, decoded beforehand; `player` tracks
-a synthetic block, decoding included; `command` runs `airborne track` on the example from start to report. Printed: CPU
-time of a frame or of the run, and the median of the pairs' ratios with its interval of 95 %; above 1 this tree is
+both. Roads: `thing` tracks the bundled example and `person` a synthetic somersault, decoded beforehand; `recorded` a
+person in four videos, `../shared/data/somersault_1` (left out, saying so, where it is missing), and `player` a
+synthetic block, both decoding included; `command` runs `airborne track` on the example from start to report. Printed:
+CPU time of a frame or of the run, and the median of the pairs' ratios with its interval of 95 %; above 1 this tree is
 slower. Where the yardstick lies beside the project (`../shared/yardstick`, needs g++), times are also in C, its time
 for one hypothesis, measured in the same turns. REV must have this tree's Python interface: since October 2026.
 """
@@ -28,8 +29,9 @@ ROOT = Path(__file__).resolve().parents[2]
 YARDSTICK = ROOT.parent / "shared" / "yardstick"
 AIRBORNE = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 EXAMPLE = ROOT / "examples" / "thrown_cross" / "trial.toml"
+RECORDING = ROOT.parent / "shared" / "data" / "somersault_1" / "trial.toml"
 STOP = {"person": 12, "player": 40}  # frames that are tracked
-ROADS = ("thing", "person", "player", "command")
+ROADS = ("thing", "person", "recorded", "player", "command")
 LEVEL = 0.95  # of the intervals
 PROCESS_ROUNDS = 3  # after which both start anew: a process may be lucky with its memory for as long as it lives
 
@@ -76,8 +78,8 @@ def work(road: str, scenes: Path) -> None:
     if road == "command":
         measure = command
     else:
-        trial = EXAMPLE if road == "thing" else scenes / road / "trial.toml"
-        measure = tracking(trial, STOP.get(road), keep=road != "player")
+        trial = {"thing": EXAMPLE, "recorded": RECORDING}.get(road, scenes / road / "trial.toml")
+        measure = tracking(trial, STOP.get(road), keep=road in ("thing", "person"))
     measure()
     print("ready", flush=True)
     for _ in sys.stdin:
@@ -190,6 +192,9 @@ def main() -> None:
                 subprocess.run(made, env=environment, check=True, stdout=subprocess.DEVNULL)
         bound = yardstick()
         for road in given.only:
+            if road == "recorded" and not RECORDING.is_file():
+                print(f"recorded: there is no {RECORDING.parent.name} beside the project; left out")
+                continue
             compare(road, trees, scenes, given.rounds, bound)
 
 

@@ -229,11 +229,13 @@ class Fitter:
         """
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
         dofs = joints_of(self.model, limb)
+        masks, maps, coarse = learned.masks, region_evidence(*learned.views), len(NEAR) - 1
         poses = [
-            fit_silhouettes(self.render_model, pose, learned.masks, levels=NEAR, dofs=dofs)
-            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, region_evidence(*learned.views))
+            fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs)
+            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, maps)
         ]
         best = max(poses, key=lambda pose: self.agreement(pose, learned).evidence)
+        best = fit_silhouettes(self.render_model, best, masks, levels=NEAR[coarse:], dofs=dofs)
         if limb_distance(self.model, fit.pose, best, limb) < SAME_M:
             return fit, prior
         widened = None if prior is None else prior.widen(dofs.columns)
