@@ -39,7 +39,7 @@ def bridge_lost_limbs(
     bridged = list(poses)
     for limb in limbs_of(model):
         columns = joints_of(model, limb).columns
-        is_known = np.isfinite(covariances[:, columns, columns]).all(axis=1)
+        is_known = np.asarray(np.isfinite(covariances[:, columns, columns]).all(axis=1))
         for stretch in stretches:
             for gap in _gaps(is_known, stretch.rows):
                 around = slice(max(gap.start - 2, stretch.rows.start), min(gap.stop + 2, stretch.rows.stop))
