@@ -70,23 +70,28 @@ OWNERS = (
 )
 
 
+def _compile_anew(function):
+    """A kernel that is not taken from the cache, which does not tell whether references are counted."""
+    fresh = kernel(function.py_func)
+    fresh._cache.load_overload = lambda *_: None
+    return fresh
+
+
 def _counts(compiled):
-    """Whether a kernel, compiled once, counts references; without the cache, which does not tell."""
+    """Whether a kernel, compiled for each of its types, counts references."""
     return {result.target_context.enable_nrt for result in compiled.overloads.values()}
 
 
 def test_kernel_that_only_slices_and_packs_what_it_is_given_counts_no_references():
     assert _sum_of_views(_Pair(VALUES, INDICES.astype(float)), 4) == 1 + 4 + 1 + 4 + 4 * 2
-    fresh = kernel(_sum_of_views.py_func)
-    fresh._cache.load_overload = lambda *_: None
+    fresh = _compile_anew(_sum_of_views)
     fresh(_Pair(VALUES, INDICES.astype(float)), 4)
     assert _counts(fresh) == {False}
 
 
 @pytest.mark.parametrize(("owner", "arguments"), OWNERS, ids=lambda each: getattr(each, "__name__", ""))
 def test_kernel_that_makes_or_returns_an_array_counts_references_and_frees_what_it_made(owner, arguments):
-    fresh = kernel(owner.py_func)
-    fresh._cache.load_overload = lambda *_: None
+    fresh = _compile_anew(owner)
     fresh(*arguments)
     assert _counts(fresh) == {True}
     _nrt_python.memsys_enable_stats()

@@ -30,7 +30,6 @@ class Region:
     view: View  # the whole one
     source: tuple[str, bytes]  # camera name and intrinsics: views that share them show the scene by the same pixels
     packed_view: NDArray[np.float64]  # (18,) of `pack_view`
-    exposure_s: float = 0.0  # of the view
 
     @property
     def aspect(self) -> float:

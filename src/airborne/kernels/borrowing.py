@@ -14,8 +14,9 @@ from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_machinery import AnalysisPass, PassManager, register_pass
 from numba.core.typed_passes import AnnotateTypes
 
-_VIEWS = {"getattr", "getitem", "static_getitem", "cast", "exhaust_iter", "build_tuple", "phi", "getiter", "iternext"}
-_VIEWS |= {"pair_first", "pair_second", "null"}
+# steps of Numba's that make no array of their own
+_VIEWS = {"getattr", "static_getitem", "cast", "exhaust_iter", "build_tuple", "phi"}
+_VIEWS |= {"getiter", "iternext", "pair_first", "pair_second", "null"}
 
 
 @register_pass(mutates_CFG=False, analysis_only=True)

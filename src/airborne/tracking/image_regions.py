@@ -138,7 +138,6 @@ def _region(view: View, points: NDArray, margin_px: float) -> Region | None:
         view=view,
         source=(camera.name, camera.K.tobytes()),
         packed_view=shift_view(packed, x0, y0),
-        exposure_s=view.exposure_s,
     )
 
 

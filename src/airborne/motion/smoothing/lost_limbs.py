@@ -20,7 +20,7 @@ from airborne.motion.joints import landmarks
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.run_fit import Stretch
 from airborne.tracking.model_based.degrees_of_freedom import joints_of, limbs_of
-from airborne.tracking.model_based.misplaced_limbs import DISTINCT_M
+from airborne.tracking.model_based.misplaced_limbs import DISTINCT_M, limb_points
 from airborne.tracking.model_based.support import mark_unobserved
 from airborne.types import Array
 
@@ -58,13 +58,19 @@ def forget_moved_limbs(model: BodyModel, tracked: Motion, fitted: Motion) -> Mot
     A fit that moves some landmark of a limb by more than `DISTINCT_M` and by more than three sds contradicts the
     tracker: one of them is wrong.
     """
-    (before, sd), (after, _) = landmarks(tracked, model), landmarks(fitted, model)
-    contradicts = np.linalg.norm(after - before, axis=-1) > np.maximum(DISTINCT_M, _CONTRADICTED_SDS * sd)
+    rows = np.flatnonzero(tracked.has_pose)
+    before, after = (
+        np.array([model.with_pose(motion.pose(row)).landmarks for row in rows]) for motion in (tracked, fitted)
+    )
+    moved_m = np.linalg.norm(after - before, axis=-1)
+    if not (moved_m > DISTINCT_M).any():
+        return fitted
+    contradicts = moved_m > np.maximum(DISTINCT_M, _CONTRADICTED_SDS * landmarks(tracked, model)[1][rows])
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
     covariance = fitted.covariance.copy()
     for limb in limbs_of(model):
         columns = joints_of(model, limb).columns
-        for row in np.flatnonzero(contradicts[:, np.isin(owners, limb)].any(axis=1)):
+        for row in rows[contradicts[:, np.isin(owners, limb)].any(axis=1)]:
             covariance[row] = mark_unobserved(covariance[row], columns)
     return replace(fitted, covariance=covariance)
 
@@ -102,9 +108,8 @@ def _way(poses: Sequence[Pose], time_s: Array, gap: slice, limb: NDArray[np.int6
 def _places(model: BodyModel, poses: Sequence[Pose], limb: NDArray[np.int64]) -> Array:
     """Return where a limb's joints and landmarks are, in the axes of the segment that it hangs on: (n, points, 3)."""
     parent = int(model.parents[limb[0]])
-    is_mark = np.isin([model.index_of(landmark.segment) for landmark in model.landmarks], limb)
     bodies = [model.with_pose(pose) for pose in poses]
-    points = [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]
+    points = limb_points(model, bodies, limb)
     return np.array([(each - body.t[parent]) @ body.R[parent] for each, body in zip(points, bodies, strict=True)])
 
 

@@ -200,7 +200,7 @@ def image_views(render_model: RenderModel, regions: Sequence[Region], appearance
         comparison = Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip)
         buffers = image_buffers(render_model, region, appearance).prepare(comparison)
         noise_px = 4 * np.pi * _FINE_SIGMA_PX * sigma_px
-        views.append(ImageView(buffers, comparison, noise_px, shift_sds_px(region), region.exposure_s))
+        views.append(ImageView(buffers, comparison, noise_px, shift_sds_px(region), region.view.exposure_s))
     return views
 
 

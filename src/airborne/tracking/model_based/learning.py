@@ -28,7 +28,7 @@ def learn_appearance(
     Colours and backgrounds are learned where asked for, and where there are none yet.
     """
     for region in regions:
-        exposure = Exposure(region.exposure_s, region.packed_view, region.camera.K)
+        exposure = Exposure(region.view.exposure_s, region.packed_view, region.camera.K)
         bodies = bodies_in_exposure(render_model, pose, motion, exposure)
         masks = [_mask(render_model, body, region) for body in bodies]
         ever, always = np.logical_or.reduce(masks), np.logical_and.reduce(masks)

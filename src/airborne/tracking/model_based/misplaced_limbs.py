@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform
 from scipy.special import ndtri
 
 from airborne.appearance.model import Region
-from airborne.body import BodyModel, Pose, SurfaceArrays, surface_of_segments
+from airborne.body import BodyModel, Pose, PosedBody, SurfaceArrays, surface_of_segments
 from airborne.body.chain import angles_near
 from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
@@ -83,10 +83,14 @@ def limb_distance(model: BodyModel, pose: Pose, other: Pose, limb: NDArray[np.in
     """Return how far apart a limb's joints and landmarks are in two poses, at most [m]."""
     if pose is other:
         return 0.0
+    here, there = limb_points(model, [model.with_pose(each) for each in (pose, other)], limb)
+    return float(np.linalg.norm(here - there, axis=1).max())
+
+
+def limb_points(model: BodyModel, bodies: Sequence[PosedBody], limb: NDArray[np.int64]) -> list[Array]:
+    """Return where each posed body has a limb's joints and landmarks: (points, 3) world [m]."""
     is_mark = np.isin([model.index_of(landmark.segment) for landmark in model.landmarks], limb)
-    bodies = [model.with_pose(each) for each in (pose, other)]
-    points = [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]
-    return float(np.linalg.norm(points[0] - points[1], axis=1).max())
+    return [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]
 
 
 def with_limb(pose: Pose, other: Pose, limb: NDArray[np.int64]) -> Array:

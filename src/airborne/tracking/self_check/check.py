@@ -182,7 +182,8 @@ def _gather(
         edge=np.zeros((n, c, 6, 6)),
         edge_by_parameter=np.zeros((n, c, 6, k)),
     )
-    empty, registered = EmptyScenes(kept, render_model, path), dict[tuple[int, int], Future[Array | None]]()
+    empty, in_light = EmptyScenes(kept, render_model, path), not render_model.model.has_joints
+    registered = list[tuple[int, int, Future[Array | None], Array, Array]]()
     with ThreadPoolExecutor(_N_THREADS) as pool:
         for i, (row, frames) in enumerate(zip(rows, moments, strict=True)):
             velocity = path.velocity(row)
@@ -197,17 +198,14 @@ def _gather(
                 columns, shifts = twists(rig, j, posed.t[0], velocity), biases(rig, j)
                 evidence.edge[i, j] = outline.edge
                 evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
-                evidence.by_twist[i, j] = outline.by_twist
-                evidence.by_parameter[i, j] = outline.by_twist @ columns + shifts
                 scene = empty.behind(j, view, silhouette) if silhouette.is_whole else None
                 if scene is not None:
-                    in_light = not render_model.model.has_joints
-                    registered[i, j] = pool.submit(_register, silhouette, view.rgb, scene, in_light=in_light)
-    for (i, j), found in registered.items():
+                    found = pool.submit(_register, silhouette, view.rgb, scene, in_light=in_light)
+                    registered.append((i, j, found, outline.by_twist, outline.by_twist @ columns + shifts))
+    for i, j, found, by_twist, by_parameter in registered:
         if (offset := found.result()) is not None:
-            evidence.offset[i, j], evidence.is_seen[i, j] = offset, True
-    for each in (evidence.by_twist, evidence.by_parameter):
-        each[~evidence.is_seen] = 0.0
+            evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = offset, by_twist, True
+            evidence.by_parameter[i, j] = by_parameter
     return evidence
 
 
