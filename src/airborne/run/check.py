@@ -11,7 +11,7 @@ from airborne.errors import AirborneError, MistakesError, TrialError, count
 from airborne.run.detections import read_trial_detections
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, is_seen
 from airborne.run.keys import keys_of_frames
-from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
+from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source
 from airborne.run.players_tracker import players_tracker_of
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
@@ -141,10 +141,11 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         if first is not None and not is_seen(model.with_pose(first.pose), recording.rig):
             checks.mistakes.append(f"{trial.name}: {OUT_OF_SIGHT}")
         elif first is not None:
-            checks.attempt(
-                lambda: refuse_mix_ups(recording, model, first.pose),
-                lambda _: "videos: nothing says that some are other cameras'",
-            )
+            with start_foregrounds(recording) as foregrounds:
+                checks.attempt(
+                    lambda: refuse_mix_ups(recording.rig, foregrounds, model, first.pose),
+                    lambda _: "videos: nothing says that some are other cameras'",
+                )
     for event in recording.events:
         checks.add(f"note: {event}")
 

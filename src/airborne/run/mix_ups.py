@@ -6,7 +6,9 @@ camera: exchanged files agree with each other's cameras, a mirrored image with i
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from itertools import combinations
 
@@ -15,7 +17,7 @@ import numpy as np
 
 from airborne.body import BodyModel, Pose
 from airborne.body.surface import surface_arrays
-from airborne.cameras import Camera
+from airborne.cameras import Camera, Rig
 from airborne.cameras.finding import Finding, join_names
 from airborne.errors import MistakesError
 from airborne.io.files import find_copies
@@ -45,12 +47,23 @@ def refuse_same_files(trial: Trial) -> None:
         raise MistakesError(trial.name, mistakes)
 
 
-def refuse_mix_ups(recording: Recording, model: BodyModel, start: Pose) -> None:
-    """Raise MistakesError, naming the cameras, where the start's silhouettes fit the videos of other cameras."""
-    with ThreadPoolExecutor(len(recording.rig)) as threads:  # most of the time is the decoders', outside Python's lock
-        images = list(threads.map(partial(_foreground, recording), recording.sources, recording.facts, recording.rig))
-    silhouettes = [_silhouette(model, start, camera) for camera in recording.rig]
-    findings = mix_ups_in(recording.rig.names, images, silhouettes)
+@contextmanager
+def start_foregrounds(recording: Recording) -> Iterator[Iterator[Mask | None]]:
+    """Yield what stands out in each camera at the start, (h, w), None past its video's end; found by other threads.
+
+    Most of the time is the decoders', outside Python's lock.
+    """
+    with ThreadPoolExecutor(len(recording.rig)) as threads:
+        yield threads.map(partial(_foreground, recording), recording.sources, recording.facts, recording.rig)
+
+
+def refuse_mix_ups(rig: Rig, foregrounds: Iterable[Mask | None], model: BodyModel, start: Pose) -> None:
+    """Raise MistakesError, naming the cameras, where the start's silhouettes fit the videos of other cameras.
+
+    foregrounds: of `start_foregrounds`.
+    """
+    silhouettes = [_silhouette(model, start, camera) for camera in rig]
+    findings = mix_ups_in(rig.names, list(foregrounds), silhouettes)
     if findings:
         raise MistakesError("the videos", [finding.sentence for finding in findings])
 

@@ -27,7 +27,7 @@ from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
 from airborne.run.folder import list_tables, prepare_folder, recorded_take, run_identity
-from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files
+from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
 from airborne.run.players_tracker import compile_kernels
@@ -108,8 +108,9 @@ def track_trial(
             opened.recording.events.extend([] if found is None else [found.note])
             return _run(PlayersRun.open(trial, opened), options, stack)
         opened = open_trial(trial, facts)
-        body = BodyRun.open(trial, opened, found if isinstance(found, FoundStart) else None)
-        refuse_mix_ups(body.recording, body.model, body.start)
+        with start_foregrounds(opened.recording) as foregrounds:
+            body = BodyRun.open(trial, opened, found if isinstance(found, FoundStart) else None)
+            refuse_mix_ups(body.recording.rig, foregrounds, body.model, body.start)
         return _run(body, options, stack)
 
 
