@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,14 +20,18 @@ _FEWEST_BARE = 3  # images in which a pixel shows no body, for their median to s
 _REDUCTION = 4  # of the maps of what the body covers
 _CELL = np.ones((3, 3), np.uint8)  # they are a cell wider all round, as the drawn body is not quite the true one
 _MOST_HIDDEN = 0.15  # share of a silhouette whose scene is not shown
+_TILE_PX = 64  # of those that are kept: 16 images of one fit into a core's cache
+
+Source = tuple[int, bytes]  # a camera's number, and its matrix: that of a field
 
 
 class EmptyScenes:
-    """What lies behind the body, by camera and field."""
+    """What lies behind the body, by camera and field: tile by tile, each found when it is first asked for."""
 
     def __init__(self, kept: Iterable[Frames], render_model: RenderModel, path: TrackedPath) -> None:
-        self._images: dict[tuple[int, bytes], list[NDArray[np.uint8]]] = {}
-        self._covered: dict[tuple[int, bytes], list[NDArray[np.uint8]]] = {}
+        self._images: dict[Source, list[NDArray[np.uint8]]] = {}
+        self._covered: dict[Source, list[NDArray[np.uint8]]] = {}
+        self._tiles: dict[tuple[Source, int, int], NDArray[np.uint8]] = {}
         for frames in kept:
             row = path.row(frames.index)
             for number, view in enumerate(frames.views):
@@ -50,16 +55,35 @@ class EmptyScenes:
         if len(images) < _FEWEST:
             return None
         x0, y0, x1, y1 = silhouette.box
-        rows, columns = np.arange(y0, y1) // _REDUCTION, np.arange(x0, x1) // _REDUCTION
-        small = np.stack(self._covered[source])
-        rows, columns = np.minimum(rows, small.shape[1] - 1), np.minimum(columns, small.shape[2] - 1)
-        covered = small[:, rows[:, None], columns]
         height, width = silhouette.mask.shape
-        n_covered = np.asarray(covered.sum(axis=0), np.float32)
+        n_covered = np.array(self._covered[source]).sum(axis=0, keepdims=True, dtype=np.uint16)
+        n_covered = _enlarge(n_covered, (y0, y1), (x0, x1))[0]
         n_covered = cv2.resize(n_covered, (width, height), interpolation=cv2.INTER_NEAREST)
         if np.mean(n_covered[silhouette.mask > 0] > len(images) - _FEWEST_BARE) > _MOST_HIDDEN:
             return None
-        return _upper_median(_without_body(np.stack([image[y0:y1, x0:x1] for image in images]), covered > 0))
+        scene = np.empty((y1 - y0, x1 - x0, 3), np.uint8)
+        for top in range(y0 - y0 % _TILE_PX, y1, _TILE_PX):
+            for left in range(x0 - x0 % _TILE_PX, x1, _TILE_PX):
+                tile = self._tile(source, top, left)[max(y0 - top, 0) : y1 - top, max(x0 - left, 0) : x1 - left]
+                y, x = max(top - y0, 0), max(left - x0, 0)
+                scene[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
+        return scene
+
+    def _tile(self, source: Source, top: int, left: int) -> NDArray[np.uint8]:
+        """Return a tile of the empty scene (h, w, 3)."""
+        if (source, top, left) not in self._tiles:
+            images = np.stack([image[top : top + _TILE_PX, left : left + _TILE_PX] for image in self._images[source]])
+            rows, columns = (top, top + images.shape[1]), (left, left + images.shape[2])
+            covered = _enlarge(np.array(self._covered[source]), rows, columns)
+            self._tiles[source, top, left] = _upper_median(_without_body(images, covered > 0))
+        return self._tiles[source, top, left]
+
+
+def _enlarge(maps: NDArray[Any], rows: tuple[int, int], columns: tuple[int, int]) -> NDArray[Any]:
+    """Return what reduced maps (n, h', w') hold at these rows and columns of the image: (n, h, w)."""
+    _, height, width = maps.shape
+    y, x = np.arange(*rows) // _REDUCTION, np.arange(*columns) // _REDUCTION
+    return maps.take(np.minimum(y, height - 1), axis=1).take(np.minimum(x, width - 1), axis=2)
 
 
 def _without_body(images: NDArray[np.uint8], covered: NDArray[np.bool_]) -> NDArray[np.uint8]:
@@ -67,8 +91,9 @@ def _without_body(images: NDArray[np.uint8], covered: NDArray[np.bool_]) -> NDAr
 
     As many are then below the others' median as above it, but for one below; `_upper_median` still finds it.
     """
-    is_white = np.cumsum(covered, axis=0, dtype=np.uint8)[covered] % 2 == 0
-    images[covered] = np.where(is_white, np.uint8(255), np.uint8(0))[:, None]
+    if covered.any():
+        is_white = np.cumsum(covered, axis=0, dtype=np.uint8) % 2 == 0
+        np.copyto(images, np.where(is_white, np.uint8(255), np.uint8(0))[..., None], where=covered[..., None])
     return images
 
 

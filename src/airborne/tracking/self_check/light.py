@@ -14,7 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.rendering.srgb import light_from_srgb
-from airborne.tracking.self_check.registration import N_SIMILARITY, Silhouette, blur, sample_box, to_px, warp_plane
+from airborne.tracking.self_check.registration import (
+    CONVERGED_PX,
+    N_SIMILARITY,
+    Silhouette,
+    blur,
+    sample_box,
+    to_px,
+    warp_plane,
+)
 from airborne.types import Array, Ints
 
 _LIGHT = light_from_srgb(np.arange(256.0)).astype(np.float32)
@@ -24,7 +32,7 @@ _TO_MEDIAN = 0.05  # pixels of the body's median light that are added to those o
 # a residual of so many medians has a quarter of the weight: as exact as 98 % of the pixels would be by least squares,
 # were residuals Gaussian; of six synthetic throws, camera times err by 0.10 ms, with 2.8 medians 0.16, with 7 0.10
 _CLIP_MEDIANS = 4.0
-_MOST_STEPS, _CONVERGED_PX = 6, 0.02  # at the likeliest blur; a shorter shift is the last
+_MOST_STEPS = 6  # at the likeliest blur
 _LEAST_MIXED = 1 / 255  # of a share times the rest of the pixel, at the widest blur: less changes no grey level
 _MARGIN_PX = 8  # about the silhouette
 _MOST_PX, _MOST_TURN = 2.0, 0.05  # of one step: shift and width, turn and scale
@@ -43,15 +51,19 @@ def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8]
     window = _window(silhouette, offset)
     silhouette, light, scene = _crop(silhouette, window), light[window], scene[window]
     sides = _sides(silhouette)
-    near = _near_edges(silhouette, sides, offset)
-    residuals = [_linearise(silhouette, sides, offset, sigma, near, light, scene)[0] for sigma in _BLURS_PX]
-    squares = [np.einsum("nc,nc->n", r, r) for r in residuals]
+    drawn = [warp_plane(silhouette, offset, side) for side in sides]
+    near = _near_edges(drawn)
+    light, scene = light[near], scene[near]
+    squares = []
+    for sigma in _BLURS_PX:
+        r = _mix(_blur_shares(silhouette, drawn, sigma)[:, *near], light, scene)[1]
+        squares.append(np.einsum("nc,nc->n", r, r))
     clip2 = _CLIP_MEDIANS**2 * max(min(float(np.median(each)) for each in squares), _LEAST_SQUARE)
     sigma = _BLURS_PX[int(np.argmin([np.sum(each / (clip2 + each)) for each in squares]))]
     for _ in range(_MOST_STEPS):
         step = _step(*_linearise(silhouette, sides, offset, sigma, near, light, scene), clip2)
         offset = offset + step
-        if np.hypot(step[0], step[1]) < _CONVERGED_PX:
+        if np.hypot(step[0], step[1]) < CONVERGED_PX:
             break
     return offset[:N_SIMILARITY] * to_px(silhouette)
 
@@ -69,9 +81,9 @@ def _crop(silhouette: Silhouette, window: tuple[slice, slice]) -> Silhouette:
     return replace(silhouette, mask=silhouette.mask[window], side=silhouette.side[window], middle=middle)
 
 
-def _near_edges(silhouette: Silhouette, sides: list[NDArray[np.float32]], offset: Array) -> tuple[Ints, Ints]:
+def _near_edges(drawn: list[NDArray[np.float32]]) -> tuple[Ints, Ints]:
     """Return rows and columns (n,) of the pixels that the widest blur mixes of sides, or a side and the scene."""
-    shares = [blur(warp_plane(silhouette, offset, side), _BLURS_PX[-1]) for side in sides]
+    shares = [blur(side, _BLURS_PX[-1]) for side in drawn]
     mixed = np.max([share * (1 - share) for share in shares], axis=0)
     rows, columns = np.nonzero(mixed > _LEAST_MIXED)
     return rows, columns
@@ -86,6 +98,28 @@ def _sides(silhouette: Silhouette) -> list[NDArray[np.float32]]:
     return [side.astype(np.float32) for side in (*sides, rest) if side.any()]
 
 
+def _blur_shares(silhouette: Silhouette, drawn: list[NDArray[np.float32]], sigma: float) -> NDArray[np.float32]:
+    """Return each drawn side's share of every pixel of a blurred image: (k, h, w)."""
+    sx, sy = silhouette.to_view
+    sigma_y = float(np.hypot(sigma, 0 if sy >= sx else np.sqrt(3) / 4 * sx / sy))  # rows of fields are interpolated
+    return np.stack([np.asarray(cv2.GaussianBlur(side, (0, 0), sigma, sigmaY=sigma_y), np.float32) for side in drawn])
+
+
+def _mix(
+    shares: NDArray[np.float32], light: NDArray[np.float32], scene: NDArray[np.float32]
+) -> tuple[Array, NDArray[np.float32]]:
+    """Return the sides' light (k, 3) that gives n pixels best, and the residual (n, 3).
+
+    shares (k, n); light, scene (n, 3): what the image shows, and what lies behind the body.
+    """
+    covered = shares.sum(axis=0)[:, None]
+    inside = covered[:, 0] > 0.5
+    A, Y = shares[:, inside].T, (light - (1 - covered) * scene)[inside]
+    median = np.median(light[inside], axis=0)
+    own = np.linalg.solve(A.T @ A + _TO_MEDIAN * np.eye(len(shares)), A.T @ Y + _TO_MEDIAN * median)
+    return own, light - (shares.T @ own + (1 - covered) * scene)
+
+
 def _linearise(
     silhouette: Silhouette,
     sides: list[NDArray[np.float32]],
@@ -97,26 +131,19 @@ def _linearise(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the residual (n, 3) of the n pixels `near`, the sides' light eliminated, and how the drawn light changes.
 
-    light, scene (h, w, 3) are compared; the change (5, n, 3) is by the offset (5,).
+    light, scene (n, 3) are compared; the change (5, n, 3) is by the offset (5,).
     """
-    sx, sy = silhouette.to_view
-    sigma_y = float(np.hypot(sigma, 0 if sy >= sx else np.sqrt(3) / 4 * sx / sy))  # rows of fields are interpolated
-    shares = np.stack(
-        [cv2.GaussianBlur(warp_plane(silhouette, offset, side), (0, 0), sigma, sigmaY=sigma_y) for side in sides]
-    )
-    gx, gy = (np.stack([cv2.Sobel(share, cv2.CV_32F, i, 1 - i, scale=1 / 8) for share in shares]) for i in (1, 0))
+    planes = _blur_shares(silhouette, [warp_plane(silhouette, offset, side) for side in sides], sigma)
     y, x = near
-    shares, gx, gy, light, scene = shares[:, y, x], gx[:, y, x], gy[:, y, x], light[y, x], scene[y, x]
+    gx, gy = (np.stack([cv2.Sobel(share, cv2.CV_32F, i, 1 - i, scale=1 / 8)[y, x] for share in planes]) for i in (1, 0))
+    shares = planes[:, y, x]
+    own, r = _mix(shares, light, scene)
     covered, sides_gx, sides_gy = (each.sum(axis=0)[:, None] for each in (shares, gx, gy))
-    inside = covered[:, 0] > 0.5
-    A, Y = shares[:, inside].T, (light - (1 - covered) * scene)[inside]
-    median = np.median(light[inside], axis=0)
-    own = np.linalg.solve(A.T @ A + _TO_MEDIAN * np.eye(len(shares)), A.T @ Y + _TO_MEDIAN * median)
-    body, by_x, by_y = shares.T @ own, gx.T @ own - sides_gx * scene, gy.T @ own - sides_gy * scene
-    by_width = np.hypot(sides_gx, sides_gy) * (body / np.maximum(covered, _LEAST_COVERED) - scene)
-    r = light - (body + (1 - covered) * scene) - offset[4] * by_width
+    by_x, by_y = gx.T @ own - sides_gx * scene, gy.T @ own - sides_gy * scene
+    by_width = np.hypot(sides_gx, sides_gy) * ((shares.T @ own) / np.maximum(covered, _LEAST_COVERED) - scene)
     dx, dy = (x - silhouette.middle[0] - offset[0])[:, None], (y - silhouette.middle[1] - offset[1])[:, None]
-    return r, np.stack([-by_x, -by_y, by_x * dy - by_y * dx, -by_x * dx - by_y * dy, by_width])
+    change = np.stack([-by_x, -by_y, by_x * dy - by_y * dx, -by_x * dx - by_y * dy, by_width])
+    return r - offset[4] * by_width, change
 
 
 def _step(r: NDArray[np.float32], change: NDArray[np.float32], clip2: float) -> Array:

@@ -28,9 +28,11 @@ _SCALES = np.exp(np.linspace(-0.18, 0.18, 7))  # of the coarse search
 _TURNS = np.radians([-12, 0, 12])  # of the coarse search
 _COARSE = 4  # reduction of the coarse search
 _SIGMA_PX = (4.0, 2.0, 1.2)  # blurs of the fine registration, coarse to fine
-_STEPS = 6  # at each blur
+_STEPS = 6  # at each blur, at most
+CONVERGED_PX = 0.02  # a step that moves nothing further is the last; offsets err by some tenths of a pixel
 _CLIP = 0.35  # a residual of the foreground this large has a quarter of the weight
 _LEAST_OVERLAP = 0.55  # correlation of silhouette and foreground below which a view says nothing
+_CLEAR_OVERLAP = 0.9  # above it a silhouette is found from where it is: in 81 views of 81 as by a search
 _LEAST_CONTRAST = 0.1  # of the foreground, below which nothing stands out
 _FARTHEST = np.array([0.5, 0.5, 0.35, 0.3])  # offsets beyond these are mistakes [silhouettes' lengths, same, rad, log]
 _LEAST_GAIN = 0.02  # correlation that a far displacement must gain to be preferred to none
@@ -134,14 +136,13 @@ def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None
     """
     if np.ptp(shown) < _LEAST_CONTRAST:
         return None
-    offset = np.append(_search(silhouette, shown), 0.0)  # the last: how much wider the outline is [px]
-    for sigma in _SIGMA_PX:
-        offset = _refine(silhouette, shown, offset, sigma)
+    offset, overlap = _refine(silhouette, shown, np.zeros(N_SIMILARITY))
+    if overlap < _CLEAR_OVERLAP:
+        offset, overlap = _refine(silhouette, shown, _search(silhouette, shown))
     length = float(max(np.ptp(np.nonzero(silhouette.mask), axis=1)))
-    if not np.all(np.abs(offset[:N_SIMILARITY]) < _FARTHEST * [length, length, 1, 1]):
+    if not np.all(np.abs(offset) < _FARTHEST * [length, length, 1, 1]):
         return None
-    overlap = _correlation(warp_plane(silhouette, offset, blur(silhouette.mask, 1.2)), blur(shown, 1.2))
-    return offset[:N_SIMILARITY] * to_px(silhouette) if overlap > _LEAST_OVERLAP else None
+    return offset * to_px(silhouette) if overlap > _LEAST_OVERLAP else None
 
 
 def outline_of(silhouette: Silhouette, posed: PosedBody) -> SilhouetteOutline:
@@ -167,7 +168,7 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
     padded = cv2.copyMakeBorder(image, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
     for turn in _TURNS:
         for scale in _SCALES:
-            candidate = np.array([0.0, 0.0, turn, np.log(scale), 0.0])
+            candidate = np.array([0.0, 0.0, turn, np.log(scale)])
             template = cv2.resize(
                 warp_plane(silhouette, candidate, silhouette.mask), size, interpolation=cv2.INTER_AREA
             )
@@ -181,12 +182,22 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
     return best
 
 
-def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float) -> Array:
+def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array) -> tuple[Array, float]:
+    """Refine an offset (4,) on images less and less blurred; return it, and how silhouette and foreground correlate."""
+    offset = np.append(offset, 0.0)  # the last: how much wider the outline is [px]
+    for sigma in _SIGMA_PX:
+        offset = _refine_at(silhouette, shown, offset, sigma)
+    drawn = warp_plane(silhouette, offset, blur(silhouette.mask, _SIGMA_PX[-1]))
+    return offset[:N_SIMILARITY], _correlation(drawn, blur(shown, _SIGMA_PX[-1]))
+
+
+def _refine_at(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float) -> Array:
     """Step to the least squares of blurred silhouette and foreground, robustly.
 
     offset (5,): shift, turn, scale and how much wider the outline is [px of the silhouette].
     """
     image, mask = blur(shown, sigma), blur(silhouette.mask, sigma)
+    reach = max(image.shape) / 2
     for _ in range(_STEPS):
         drawn = warp_plane(silhouette, offset, mask)
         gx, gy = cv2.Sobel(drawn, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(drawn, cv2.CV_32F, 0, 1, scale=1 / 8)
@@ -206,6 +217,8 @@ def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, s
         step[2:4] = np.clip(step[2:4], -0.05, 0.05)
         offset = offset + step
         offset[4] = np.clip(offset[4], -2, 2)
+        if np.abs(step * [1, 1, reach, reach, 1]).max() < CONVERGED_PX:
+            break
     return offset
 
 
