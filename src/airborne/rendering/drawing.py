@@ -26,10 +26,10 @@ from airborne.rendering.rows import (
     draw_row,
     f4,
     light_block,
-    list_spans,
     new_row,
 )
 from airborne.rendering.shapes import VIEW_K, new_shapes, pose_shapes
+from airborne.rendering.spans import list_spans
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,12 +90,12 @@ def draw_maps(shapes, geometry, R, t, view, lights, ambient, part, segment, inve
     """Draw on maps that hold background everywhere; see `Rendering` for them, `sum_hypotheses` for the rest."""
     height, width = part.shape
     pose_shapes(shapes, geometry, R, t)
-    row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
+    top, row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
     row = new_row(width)
     n_ellipsoids = len(geometry.ellipsoid_part)
     x_step, y_step = f4(view[VIEW_K]), f4(view[VIEW_K + 3])
-    for v in range(height):
-        start, stop = row_start[v], row_stop[v]
+    for i in range(len(row_stop)):
+        v, start, stop = top + i, row_start[i], row_stop[i]
         if stop == start:
             continue
         first, last = block_range(ends, start, stop)

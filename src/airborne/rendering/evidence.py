@@ -17,8 +17,8 @@ from airborne.cameras import Camera
 from airborne.kernels import kernel
 from airborne.rendering.packing import pack_view
 from airborne.rendering.reduction import reduce_camera, reduce_image
-from airborne.rendering.rows import list_spans
-from airborne.rendering.shapes import new_shapes, pose_shapes
+from airborne.rendering.shapes import new_shapes, outline_all, pose_shapes
+from airborne.rendering.spans import shown_rows, sort_runs
 from airborne.rendering.threads import in_threads
 from airborne.types import Array
 
@@ -63,7 +63,8 @@ def mask_evidence(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: Arra
 
     def fill(part: slice) -> None:
         shapes = new_shapes(geometry)
-        _sum_evidence(shapes, geometry, R[part], t[part], maps.views, maps.sizes, maps.sums, out[part])
+        runs = _room_for_runs(geometry)
+        _sum_evidence(shapes, geometry, R[part], t[part], maps.views, maps.sizes, maps.sums, *runs, out[part])
 
     in_threads(fill, len(R), threads)
     return out
@@ -74,29 +75,33 @@ def mask_out_surface(geometry: SurfaceArrays, maps: EvidenceMaps, R: Array, t: A
 
     Of masks that share some segments, only the others have to be drawn on what these leave.
     """
-    sums = np.zeros_like(maps.sums)
+    sums = maps.sums.copy()
     poses = np.ascontiguousarray(R, float), np.ascontiguousarray(t, float)
-    _sum_uncovered(new_shapes(geometry), geometry, *poses, maps.views, maps.sizes, maps.sums, sums)
+    runs = _room_for_runs(geometry)
+    _sum_uncovered(new_shapes(geometry), geometry, *poses, maps.views, maps.sizes, maps.sums, *runs, sums)
     ends = [sums[at : at + rows * (pixels + 1)].reshape(rows, -1)[:, -1] for pixels, rows, at in maps.sizes]
     return replace(maps, sums=sums, totals=np.array([each.sum(dtype=float) for each in ends]))
 
 
+def _room_for_runs(geometry: SurfaceArrays) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    n = 2 * (len(geometry.ellipsoid_segment) + len(geometry.polygon_segment))
+    return np.empty(n, np.int64), np.empty(n, np.int64)
+
+
 @kernel(fastmath=True)
-def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
-    """Fill `out` (n, views); see `mask_evidence`. In each row the spans are sorted from the left and merged."""
+def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, firsts, lasts, out):
+    """Fill `out` (n, views); see `mask_evidence`. firsts, lasts: room for a row's runs; see `sort_runs`."""
     for h in range(len(R)):
         pose_shapes(shapes, geometry, R[h], t[h])
         for i in range(len(views)):
             width, height, offset = sizes[i, 0], sizes[i, 1], sizes[i, 2]
-            spans = list_spans(shapes, geometry, views[i], width, height)
-            row_start, row_stop, ends = spans.row_start, spans.row_stop, spans.ends
+            outline_all(shapes, geometry, views[i], width, height)
+            top, bottom = shown_rows(shapes, height)
             total = 0.0
-            for v in range(height):
-                start, stop = row_start[v], row_stop[v]
-                _sort_spans(ends, start, stop)
+            for v in range(top, bottom + 1):
                 base, covered = offset + v * (width + 1), -1
-                for k in range(start, stop):
-                    first, last = max(ends[k, 0], covered + 1), ends[k, 1]
+                for k in range(sort_runs(shapes, geometry, v, width, firsts, lasts)):
+                    first, last = max(firsts[k], covered + 1), lasts[k]
                     if last >= first:
                         total += sums[base + last + 1] - sums[base + first]
                         covered = last
@@ -104,19 +109,17 @@ def _sum_evidence(shapes, geometry, R, t, views, sizes, sums, out):
 
 
 @kernel(fastmath=True)
-def _sum_uncovered(shapes, geometry, R, t, views, sizes, sums, out):
-    """Fill `out`, as `sums`, without the pixels that a body covers; see `mask_out_surface`."""
+def _sum_uncovered(shapes, geometry, R, t, views, sizes, sums, firsts, lasts, out):
+    """Take the pixels that a body covers out of `out`, which is like `sums`; see `mask_out_surface`."""
     pose_shapes(shapes, geometry, R, t)
     for i in range(len(views)):
         width, height, offset = sizes[i, 0], sizes[i, 1], sizes[i, 2]
-        spans = list_spans(shapes, geometry, views[i], width, height)
-        row_start, row_stop, ends = spans.row_start, spans.row_stop, spans.ends
-        for v in range(height):
-            start, stop = row_start[v], row_stop[v]
-            _sort_spans(ends, start, stop)
+        outline_all(shapes, geometry, views[i], width, height)
+        top, bottom = shown_rows(shapes, height)
+        for v in range(top, bottom + 1):
             base, at, hidden = offset + v * (width + 1), 0, 0.0
-            for k in range(start, stop):
-                first, last = max(ends[k, 0], at), ends[k, 1]
+            for k in range(sort_runs(shapes, geometry, v, width, firsts, lasts)):
+                first, last = max(firsts[k], at), lasts[k]
                 if last >= first:
                     for u in range(at, first):
                         out[base + u + 1] = sums[base + u + 1] - hidden
@@ -126,14 +129,3 @@ def _sum_uncovered(shapes, geometry, R, t, views, sizes, sums, out):
                     at = last + 1
             for u in range(at, width):
                 out[base + u + 1] = sums[base + u + 1] - hidden
-
-
-@kernel(fastmath=True, is_inner=True)
-def _sort_spans(ends, start, stop):
-    """Sort the spans `start` to `stop - 1` of a row from the left, by insertion: there are few."""
-    for k in range(start + 1, stop):
-        first, last, at = ends[k, 0], ends[k, 1], k
-        while at > start and ends[at - 1, 0] > first:
-            ends[at, 0], ends[at, 1] = ends[at - 1, 0], ends[at - 1, 1]
-            at -= 1
-        ends[at, 0], ends[at, 1] = first, last

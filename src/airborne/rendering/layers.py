@@ -17,10 +17,10 @@ from airborne.rendering.rows import (
     draw_row,
     f4,
     light_block,
-    list_spans,
     new_row,
 )
 from airborne.rendering.shapes import VIEW_K, pose_shapes
+from airborne.rendering.spans import list_spans
 
 
 @kernel(fastmath=True)
@@ -35,14 +35,14 @@ def draw_layers(shapes, geometry, R, t, view, lights, ambient, part, segment, va
     part[:] = -1
     segment[:] = -1
     pose_shapes(shapes, geometry, R, t)
-    row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
+    top, row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
     most = 0
-    for v in range(height):
-        most = max(most, row_stop[v] - row_start[v])
+    for i in range(len(row_stop)):
+        most = max(most, row_stop[i] - row_start[i])
     row, most = new_row(width), most * (width // 2 + 1)
     ends_behind, curves_behind = np.empty((most, 3), np.int64), np.empty((most, 2))
-    for v in range(height):
-        start, stop = row_start[v], row_stop[v]
+    for i in range(len(row_stop)):
+        v, start, stop = top + i, row_start[i], row_stop[i]
         if stop == start:
             continue
         first, last = block_range(ends, start, stop)

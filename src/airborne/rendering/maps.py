@@ -22,10 +22,10 @@ from airborne.rendering.rows import (
     draw_row,
     f4,
     light_block,
-    list_spans,
     new_row,
 )
 from airborne.rendering.shapes import B_1, B_U, B_V, VIEW_K, pose_shapes
+from airborne.rendering.spans import list_spans
 
 
 class SurfaceMaps(NamedTuple):
@@ -61,12 +61,12 @@ def surface_maps(shapes, geometry, R, t, view, part, inverse_depth, values, ligh
     part[:] = -1
     inverse_depth[:] = 0
     pose_shapes(shapes, geometry, R, t)
-    row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
+    top, row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
     row, with_values = new_row(width), values.size > 0
     n_ellipsoids = len(geometry.ellipsoid_part)
     x_step, y_step = f4(view[VIEW_K]), f4(view[VIEW_K + 3])
-    for v in range(height):
-        start, stop = row_start[v], row_stop[v]
+    for i in range(len(row_stop)):
+        v, start, stop = top + i, row_start[i], row_stop[i]
         if stop == start:
             continue
         first, last = block_range(ends, start, stop)

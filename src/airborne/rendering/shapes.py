@@ -7,7 +7,7 @@ Every shape, ellipsoid or polygon, becomes one row of numbers for the same pixel
 
 For an ellipsoid (x - c)'M(x - c) = 1 in camera axes with g = M c and k = c'M c - 1: B = K^-T g / k, N = M K^-1, and the
 outline is (u, v, 1) Q (u, v, 1)' >= 0 with Q = B B' - K^-T M K^-1 / k, alpha = -Q00. The near surface's height along
-the ellipsoid's third axis a, as a share of that semi-axis, is a.K^-1 (u, v, 1) / w - a.c: `rows.py` cuts the rows of
+the ellipsoid's third axis a, as a share of that semi-axis, is a.K^-1 (u, v, 1) / w - a.c: `spans.py` cuts the rows of
 an ellipsoid with a slab where it meets the slab's two heights. A polygon of the plane m.x = d has
 B = K^-T m / d, alpha = 0, N = 0 and g = -m; where its shading is smooth, a triangle of corners X_i and normals n_i has
 g = 0 and N = sum n_i (X_j x X_k)' K^-1 / det(X), the n_i weighted by nearness, times w. A row cuts a polygon between

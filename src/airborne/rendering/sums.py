@@ -17,10 +17,10 @@ from airborne.rendering.rows import (
     draw_row,
     f4,
     light_block,
-    list_spans,
     new_row,
 )
 from airborne.rendering.shapes import VIEW_K, pose_shapes
+from airborne.rendering.spans import list_spans
 
 _DARK_SUM = 30.0  # a pixel whose R + G + B is below this has no usable chromaticity
 
@@ -91,12 +91,12 @@ def sum_hypotheses(shapes, geometry, R, t, views, sizes, lights, ambient, images
         for i in range(len(views)):
             width, height, offset, view = sizes[i, 0], sizes[i, 1], sizes[i, 2], views[i]
             blocks = (width + LANES - 1) // LANES
-            row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
+            top, row_start, row_stop, ends, curves = list_spans(shapes, geometry, view, width, height)
             for k in range(SUMS * LANES):
                 totals[k] = 0
             x_step, y_step = f4(view[VIEW_K]), f4(view[VIEW_K + 3])
-            for v in range(height):
-                start, stop = row_start[v], row_stop[v]
+            for k in range(len(row_stop)):
+                v, start, stop = top + k, row_start[k], row_stop[k]
                 if stop == start:
                     continue
                 first, last = block_range(ends, start, stop)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import PosedBody
+from airborne.rendering import EvidenceMaps
 from airborne.tracking.image_regions import narrow_regions
 from airborne.tracking.model_based.gauss_newton import ImageView, Posteriors, image_views
+from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -16,7 +19,7 @@ from airborne.types import Array
 _MARGIN_PX = 12  # of a full frame: the blur's radius, and how far images move a body beyond its silhouettes
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LearnedRegions:
     """The regions of one time whose colours have been learned."""
 
@@ -35,6 +38,11 @@ class LearnedRegions:
     def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
         """The regions and each pixel's probability (h, w) to be body."""
         return self.masks.regions, self.masks.planes
+
+    @cached_property
+    def evidence(self) -> EvidenceMaps:
+        """Each pixel's evidence for the body, for the searches of limbs."""
+        return region_evidence(*self.views)
 
     def image_views(
         self, render_model: RenderModel, bodies: Sequence[PosedBody], *, are_narrow: bool

@@ -17,6 +17,7 @@ from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.geometry.sampling import sobol_points
+from airborne.kernels import kernel
 from airborne.rendering import EvidenceMaps, mask_evidence, mask_out_surface
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
@@ -116,13 +117,34 @@ class _LimbSearch:
         t = np.broadcast_to(self.root.translation, (len(angles), 3))
         R, t = self.model.pose_segments(R, t, angles)
         scores = mask_evidence(self.surface, self.maps, R, t).sum(axis=1)
-        left, best = np.argsort(-scores, kind="stable"), []
-        places = t[left][:, self.limb]
-        while len(left) and len(best) < n:
-            best.append(left[0])
-            is_away = (((places - places[0]) ** 2).sum(axis=2) > DISTINCT_M**2).any(axis=1)
-            left, places = left[is_away], places[is_away]
-        return angles[best]
+        return angles[_distinct_places(np.argsort(-scores, kind="stable"), t[:, self.limb], DISTINCT_M, n)]
+
+
+@kernel
+def _distinct_places(order, places, least, n):
+    """Return the first n of `order` of which some joint is `least` or more away from that in each one taken before.
+
+    places (candidates, joints, 3) [m].
+    """
+    taken, n_taken = np.empty(n, np.int64), 0
+    for candidate in order:
+        is_new = True
+        for k in range(n_taken):
+            farthest = 0.0
+            for joint in range(places.shape[1]):
+                squared = 0.0
+                for axis in range(3):
+                    squared += (places[candidate, joint, axis] - places[taken[k], joint, axis]) ** 2
+                farthest = max(farthest, squared)
+            if farthest <= least**2:
+                is_new = False
+                break
+        if is_new:
+            taken[n_taken] = candidate
+            n_taken += 1
+            if n_taken == n:
+                break
+    return taken[:n_taken]
 
 
 def _all_over(limits: JointLimits, joints: NDArray[np.int64], angles: Array) -> Array:
