@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform
 
+from airborne.body.chain import clamp_to_limits, joint_angles_of
 from airborne.tracking.model_based import gauss_newton
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.learned_regions import LearnedRegions
-from airborne.tracking.model_based.turned_pelvis import turn_pelvis
+from airborne.tracking.model_based.turned_pelvis import is_twisted, turn_pelvis, turn_pelvis_back
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import LearnedFrame
 
 NARROW = np.repeat([0.02, 0.05, 0.05], [3, 3, 3 * HUMAN.n_joints])
 WHOLE = np.arange(len(HUMAN.segments))
+LEG = ("thigh", "shank", "foot_")
 LEGS = np.array([HUMAN.index_of(f"{name}_{side}") for name in ("thigh", "shank") for side in ("left", "right")])
 
 
@@ -75,4 +77,35 @@ def test_pelvis_turns_back_though_no_step_leads_there(frame, fitter, monkeypatch
     monkeypatch.setattr(Fitter, "fit_silhouettes", lambda fitter, pose, learned, levels, prior: pose)
     held, judged = judge_held(frame, fitter, turn_pelvis(HUMAN, frame.truth)[-1])
     assert frame.off_mm(held.pose, LEGS) > 60
+    assert frame.off_mm(judged.fit.pose, LEGS) < 20
+
+
+def test_turned_back_pelvis_has_each_leg_where_the_other_was(frame):
+    before = HUMAN.with_pose(frame.truth)
+    for pose in turn_pelvis_back(HUMAN, frame.truth):
+        after = HUMAN.with_pose(pose)
+        for side, other in (("left", "right"), ("right", "left")):
+            hip, knee = HUMAN.index_of(f"thigh_{side}"), HUMAN.index_of(f"shank_{side}")
+            aim, leg = before.t[HUMAN.index_of(f"shank_{other}")] - after.t[hip], after.t[knee] - after.t[hip]
+            np.testing.assert_allclose(np.cross(aim, leg), 0, atol=1e-12)
+            np.testing.assert_allclose(after.R[knee], before.R[HUMAN.index_of(f"shank_{other}")], atol=1e-12)
+
+
+def twist_trunk(pose, truth):
+    """The pose with its trunk twisted joint by joint, as far as it goes, so that chest and arms point as they do."""
+    for first in (HUMAN.index_of("chest"), HUMAN.index_of("head")):
+        pose = clamp_to_limits(HUMAN, pose)
+        R, rest = HUMAN.with_pose(pose).R, [i for i in WHOLE if i >= first and HUMAN.segments[i].name[:5] not in LEG]
+        R[rest] = HUMAN.with_pose(truth).R[rest]
+        pose = replace(pose, joint_angles=joint_angles_of(HUMAN, R, near=pose.joint_angles))
+    return clamp_to_limits(HUMAN, pose)
+
+
+@pytest.mark.parametrize("number", [3, 4])  # turned by 70 degrees, one way and the other
+def test_legs_taken_for_each_other_are_exchanged_where_the_trunk_is_twisted(frame, fitter, number):
+    wrong = twist_trunk(turn_pelvis_back(HUMAN, frame.truth)[number], frame.truth)
+    assert not is_twisted(HUMAN, frame.truth)
+    assert is_twisted(HUMAN, wrong)
+    held, judged = judge_held(frame, fitter, wrong)
+    assert frame.off_mm(held.pose, LEGS) > 100
     assert frame.off_mm(judged.fit.pose, LEGS) < 20

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import clamp_to_limits, joint_angles_of
@@ -28,6 +29,15 @@ def swap_limbs(model: BodyModel, pose: Pose) -> list[Pose]:
         angles = joint_angles_of(model, R_swapped, near=_mirror_angles(pose.joint_angles, limb))
         poses.append(clamp_to_limits(model, replace(pose, joint_angles=angles)))
     return poses
+
+
+def counterparts(model: BodyModel) -> NDArray[np.int64]:
+    """Return for every segment its counterpart on the other side, or itself: (segments,)."""
+    other = np.arange(len(model.segments))
+    for limb in _limbs(model):
+        for left, right in limb:
+            other[left], other[right] = right, left
+    return other
 
 
 def is_nearer(model: BodyModel, pose: Pose, other: Pose, expected: Pose) -> bool:

@@ -1,32 +1,55 @@
-"""A pelvis that is turned alone: it is almost as deep as wide, so that little but the roots of the legs shows it."""
+"""A pelvis that is turned alone: it is almost as deep as wide, so that little but the roots of the legs shows it.
+
+Where it is turned so far that the trunk is twisted to its limits, the legs have often been taken for each other, too.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import joint_angles_of
-from airborne.tracking.model_based.degrees_of_freedom import limbs_of
+from airborne.geometry.rotations import matrix_from_angles
+from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment, limbs_of
+from airborne.tracking.model_based.left_right_swap import counterparts
 
 _TURNS_RAD = np.radians([-60, -40, -20, 20, 40, 60])  # about the long axis; further, a leg would cross the other
+# with which the legs are exchanged: every 30 degrees, half of which a fit makes up for
+_TURNS_BACK_RAD = np.radians([-160, -130, -100, -70, 70, 100, 130, 160])
+_AT_LIMIT_RAD = np.radians(1.0)  # the soft walls let a joint through by a few degrees
+_FEWEST_AT_LIMIT = 2  # joints of the trunk: one is often at a limit, of two recorded somersaults
 
 
 def turn_pelvis(model: BodyModel, pose: Pose) -> list[Pose]:
     """Return poses with the root turned about its long axis; limbs on it aim where they did, nothing else moves."""
-    return [_turn(model, pose, angle) for angle in _TURNS_RAD]
+    return [_turn(model, pose, angle, np.arange(len(model.segments))) for angle in _TURNS_RAD]
 
 
-def _turn(model: BodyModel, pose: Pose, angle: float) -> Pose:
-    body = model.with_pose(pose)
-    R = body.R.copy()
+def turn_pelvis_back(model: BodyModel, pose: Pose) -> list[Pose]:
+    """Return poses with the root turned further; limbs on it aim where their counterparts did, turned like these."""
+    return [_turn(model, pose, angle, counterparts(model)) for angle in _TURNS_BACK_RAD]
+
+
+def is_twisted(model: BodyModel, pose: Pose) -> bool:
+    """Whether two joints of the trunk or more lie at their limits."""
+    slack = model.limits.slack(matrix_from_angles(pose.joint_angles))
+    return int(np.sum((slack < _AT_LIMIT_RAD) & (limb_of_segment(model)[1:] < 0))) >= _FEWEST_AT_LIMIT
+
+
+def _turn(model: BodyModel, pose: Pose, angle: float, source: NDArray[np.int64]) -> Pose:
+    """Turn the root; its limbs take the rotations and aims of those of the segments `source` (segments,)."""
+    body, on_root = model.with_pose(pose), [limb for limb in limbs_of(model) if model.parents[limb[0]] == 0]
+    R, t = body.R.copy(), body.t.copy()
+    for limb in on_root:
+        R[limb], t[limb] = body.R[source[limb]], body.t[source[limb]]
     R[0] = R[0] @ Rotation.from_rotvec([0, 0, angle]).as_matrix()
-    for first, second, *_ in limbs_of(model):
-        if model.parents[first] == 0:
-            joint = body.t[0] + R[0] @ np.asarray(model.segments[first].joint_m)
-            before, after = body.t[second] - body.t[first], body.t[second] - joint
-            R[first] = Rotation.align_vectors(after, before)[0].as_matrix() @ R[first]
+    for first, second, *_ in on_root:
+        joint = body.t[0] + R[0] @ np.asarray(model.segments[first].joint_m)
+        before, after = R[first] @ np.asarray(model.segments[second].joint_m), t[second] - joint
+        R[first] = Rotation.align_vectors(after, before)[0].as_matrix() @ R[first]
     root = RigidTransform.from_components(pose.world_from_root.translation, Rotation.from_matrix(R[0]))
     return replace(pose, world_from_root=root, joint_angles=joint_angles_of(model, R, near=pose.joint_angles))
