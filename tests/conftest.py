@@ -17,6 +17,7 @@ from airborne.calibration.sources.control_points import ControlPoints, read_cont
 from tests.support.places import ROOT
 
 SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
+WARMING = pytest.StashKey[subprocess.Popen]()  # the process that compiles the kernels
 SLOW_FILES = Path(__file__).with_name("slow_files.txt")  # CPU seconds and file, kernels not yet compiled
 
 
@@ -25,11 +26,19 @@ def pytest_addoption(parser):
 
 
 def pytest_sessionstart(session):
-    """Compile the kernels of a fresh clone once, before each worker does so."""
+    """Begin to compile the kernels of a fresh clone once, before each worker does so."""
     config = session.config
     is_controller = config.getoption("numprocesses", None) and not hasattr(config, "workerinput")
     if is_controller and not any((ROOT / "src").rglob("*.nbc")) and "NUMBA_CACHE_DIR" not in os.environ:
-        subprocess.run([sys.executable, "-c", "from airborne.run.warm import warm_kernels; warm_kernels()"], check=True)
+        words = "from airborne.run.warm import warm_kernels; warm_kernels()"
+        config.stash[WARMING] = subprocess.Popen([sys.executable, "-c", words])
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_node_collection_finished(node):
+    """Wait for the kernels: a worker has listed the tests meanwhile, and gets the first of them next."""
+    warming = node.config.stash.get(WARMING, None)
+    assert warming is None or warming.wait() == 0, "the kernels were not compiled"
 
 
 def pytest_configure(config):

@@ -55,7 +55,7 @@ from benchmarks.rows import append
 from benchmarks.speed.compare import median_interval
 
 SEED = 11  # of the throws
-N_FIELDS = 8  # tracked for one cost; of the first nothing is counted
+N_FIELDS, N_QUICK = 8, 3  # tracked for one cost; of the first nothing is counted
 BAR_M = (1.2, 0.09, 0.05)  # of `segments`
 FLOORS = {"picture": 0.2, "length": 1.02}  # largest exponents
 FACTORS = ("picture", "body", "cameras", "segments", "players", "length")
@@ -126,10 +126,16 @@ def reading_cost(frames: Sequence[Frames], folder: Path) -> Cost:
     return read
 
 
+def drawn(scene: Scene, quick: bool) -> list[Frames]:
+    """Return the fields of a scene that are tracked."""
+    n = N_QUICK if quick else N_FIELDS
+    return list(islice(scene_frames(replace(scene, n_pictures=N_FIELDS)), n))
+
+
 def picture(quick: bool, folder: Path) -> dict[str, Points]:
     """Return tracking and reading in larger pictures, by pixels of a field over those of 768 x 288."""
-    scene = replace(cross_scene(seed=SEED), n_pictures=N_FIELDS)
-    frames = list(islice(scene_frames(scene), N_FIELDS))
+    scene = cross_scene(seed=SEED)
+    frames = drawn(scene, quick)
     shares = (1, 2) if quick else (1, 2, 4)
     larger = {share: with_views(frames, lambda view, share=share: in_larger_picture(view, share)) for share in shares}
     return {
@@ -140,8 +146,8 @@ def picture(quick: bool, folder: Path) -> dict[str, Points]:
 
 def body(quick: bool, folder: Path) -> dict[str, Points]:
     """Return tracking where picture and body grow together, by pixels over those of 768 x 288."""
-    scene = replace(cross_scene(seed=SEED), n_pictures=N_FIELDS)
-    frames = list(islice(scene_frames(scene), N_FIELDS))
+    scene = cross_scene(seed=SEED)
+    frames = drawn(scene, quick)
     shares = (1, 2) if quick else (0.5, 1, 2, 3)
     larger = {share: with_views(frames, lambda view, share=share: enlarged(view, share)) for share in shares}
     return {"body": {share**2: thing_cost(scene, each) for share, each in larger.items()}}
@@ -159,8 +165,8 @@ def cameras(quick: bool, folder: Path) -> dict[str, Points]:
             for k, angle in enumerate(angles, start=1)
         )
     )  # fmt: skip
-    scene = replace(cross_scene(seed=SEED), n_pictures=N_FIELDS, rig=rig)
-    frames = list(islice(scene_frames(scene), N_FIELDS))
+    scene = replace(cross_scene(seed=SEED), rig=rig)
+    frames = drawn(scene, quick)
     points: Points = {}
     for n in (2, 4) if quick else (2, 4, 8):
         chosen = {2: [2, 5], 4: [0, 2, 5, 7], 8: range(8)}[n]
@@ -190,8 +196,8 @@ def segments(quick: bool, folder: Path) -> dict[str, Points]:
     for n in (1, 3) if quick else (1, 3, 6, 12):
         own = bar(n)
         flight = Throw(bar(1), thrown.flight.density_kg_m3, thrown.flight.launch)
-        scene = replace(thrown, body=own, flight=flight, n_pictures=N_FIELDS)
-        points[n] = thing_cost(scene, list(islice(scene_frames(scene), N_FIELDS)))
+        scene = replace(thrown, body=own, flight=flight)
+        points[n] = thing_cost(scene, drawn(scene, quick))
     return {"segments": points}
 
 

@@ -9,6 +9,7 @@ import pytest
 from airborne.errors import ResultError
 from airborne.run.track import track_trial
 from airborne.tracking.model_based.refined import RefinedTracker
+from airborne.trial.calibration import CalibrationTable
 from airborne.trial.file import Trial, read_trial
 from airborne.trial.keys import KeyTable
 from airborne.trial.masks import MaskTable
@@ -26,8 +27,11 @@ def key(thrown_cross, frame: int, **changes) -> KeyTable:
 
 @pytest.fixture(scope="module")
 def cross(thrown_cross):
+    exact = CalibrationTable(file="calib_true.toml")
+
     def with_keys(*keys: KeyTable) -> Trial:
-        return read_trial(thrown_cross / "trial.toml", {"stop": LAST}).model_copy(update={"key": list(keys)})
+        trial = read_trial(thrown_cross / "trial.toml", {"stop": LAST})
+        return trial.model_copy(update={"key": list(keys), "calibration": exact})
 
     return with_keys
 
