@@ -20,8 +20,8 @@ from airborne.tracking.model_based.left_right_swap import counterparts
 _TURNS_RAD = np.radians([-60, -40, -20, 20, 40, 60])  # about the long axis; further, a leg would cross the other
 # with which the legs are exchanged: every 30 degrees, half of which a fit makes up for
 _TURNS_BACK_RAD = np.radians([-160, -130, -100, -70, 70, 100, 130, 160])
-_AT_LIMIT_RAD = np.radians(1.0)  # the soft walls let a joint through by a few degrees
-_FEWEST_AT_LIMIT = 2  # joints of the trunk: one is often at a limit, of two recorded somersaults
+_AT_LIMIT_RAD = np.radians(1.0)  # a joint with less slack lies at its limit: its walls are soft by some degrees
+_FEWEST_AT_LIMIT = 2  # joints of the trunk: a single one often is, in tucks of two recorded somersaults
 
 
 def turn_pelvis(model: BodyModel, pose: Pose) -> list[Pose]:
