@@ -50,8 +50,8 @@ Order = Literal["refined", "joint", "hierarchical"]
 
 # what a limb costs that is not where it was expected; of synthetic limbs moved at 7, a third more were wrong
 LOST_NATS = 10.0
-# of evidence that a mask gains at least where a new fit of the whole body is better: of 153 such fits, of three synthetic
-# people and two recorded ones, the 29 that were taken had gained 5.3 or more
+# of evidence that a mask gains at least where a new fit of the whole body is better: of 153 such fits, of three
+# synthetic people and two recorded ones, the 29 that were taken had gained 5.3 or more
 _RISEN_NATS = 4.0
 _BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
 _FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
