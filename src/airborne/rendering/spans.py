@@ -65,13 +65,11 @@ def _find_spans(shapes, geometry, width, top, row_start, row_stop, ends, curves)
     for s in range(len(shapes.rows)):
         for v in range(shapes.rows[s, 0], shapes.rows[s, 1] + 1):
             if s >= n_ellipsoids:
-                edge, stop_edge = geometry.start[s - n_ellipsoids], geometry.start[s - n_ellipsoids + 1]
-                low, high = _cut_polygon(shapes.edges, edge, stop_edge, v, width)
+                low, high = _cut_polygon(shapes.edges, geometry.start, s - n_ellipsoids, v, width)
                 _add_span(low, high, 0.0, 0.0, s, v - top, row_stop, ends, curves)
                 continue
             outline = shapes.outline[s]
-            squared = outline[HALF_1] + v * (outline[HALF_V] + v * outline[HALF_VV])
-            middle, half = outline[MID_V] * v + outline[MID_1], math.sqrt(max(squared, 0.0))
+            squared, middle, half = _curve_in_row(outline, v)
             if shapes.is_cut[s]:
                 low, end, start, high = _cut_ellipsoid(outline, shapes.slab[s], v, middle, half, width)
                 _add_span(low, end, middle, squared, s, v - top, row_stop, ends, curves)
@@ -105,13 +103,11 @@ def sort_runs(shapes, geometry, v, width, firsts, lasts):
         if v < shapes.rows[s, 0] or v > shapes.rows[s, 1]:
             continue
         if s >= n_ellipsoids:
-            edge, stop_edge = geometry.start[s - n_ellipsoids], geometry.start[s - n_ellipsoids + 1]
-            low, high = _cut_polygon(shapes.edges, edge, stop_edge, v, width)
+            low, high = _cut_polygon(shapes.edges, geometry.start, s - n_ellipsoids, v, width)
             n = _insert_run(low, high, firsts, lasts, n)
             continue
         outline = shapes.outline[s]
-        squared = outline[HALF_1] + v * (outline[HALF_V] + v * outline[HALF_VV])
-        middle, half = outline[MID_V] * v + outline[MID_1], math.sqrt(max(squared, 0.0))
+        _, middle, half = _curve_in_row(outline, v)
         if shapes.is_cut[s]:
             low, end, start, high = _cut_ellipsoid(outline, shapes.slab[s], v, middle, half, width)
             n = _insert_run(low, end, firsts, lasts, n)
@@ -135,6 +131,13 @@ def _insert_run(low, high, firsts, lasts, n):
         at -= 1
     firsts[at], lasts[at] = first, last
     return n + 1
+
+
+@kernel(fastmath=True, is_inner=True)
+def _curve_in_row(outline, v):
+    """Return half the width of an ellipsoid's outline in row v, squared, its middle, and half the width [px]."""
+    squared = outline[HALF_1] + v * (outline[HALF_V] + v * outline[HALF_VV])
+    return squared, outline[MID_V] * v + outline[MID_1], math.sqrt(max(squared, 0.0))
 
 
 @kernel(fastmath=True, is_inner=True)
@@ -163,10 +166,10 @@ def _cut_ellipsoid(outline, slab, v, middle, half, width):
 
 
 @kernel(fastmath=True, is_inner=True)
-def _cut_polygon(edges, first_edge, stop_edge, v, width):
-    """Return from where to where row v lies between the edges of a polygon [px]."""
+def _cut_polygon(edges, starts, p, v, width):
+    """Return from where to where row v lies between the edges of polygon p [px]."""
     low, high = 0.0, width - 1.0
-    for i in range(first_edge, stop_edge):
+    for i in range(starts[p], starts[p + 1]):
         side, bound = edges[i, 0], edges[i, 1] * v + edges[i, 2]
         if side > 0:
             low = max(low, bound)

@@ -162,9 +162,8 @@ class Fitter:
         beyond what counts. So the mask's evidence counts too, a patch of pixels as one. A trunk that is twisted to its
         limits is as unlikely as a lost limb.
         """
-        evidence = self.agreement(fit.equations.pose, learned).evidence
-        twist = LOST_NATS * (self.moves_joints and is_twisted(self.model, fit.pose))
-        return fit.objective(misfit, prior) - evidence / fit.equations.shared + twist
+        of_mask = self.agreement(fit.equations.pose, learned).evidence / fit.equations.shared
+        return fit.objective(misfit, prior) - of_mask + self._twist_nats(fit.pose)
 
     def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
         bodies = [self.render_model.with_pose(pose) for pose in poses]
@@ -206,38 +205,38 @@ class Fitter:
         return faults
 
     def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
-        """Fit everything again, freer of what was expected; return the better fit, with its prior.
-
-        Only poses whose masks agree better are fitted to the images: what images add to that is less.
-        """
+        """Fit everything again, to images where the mask rises, freer of what was expected; return the better fit."""
         if prior is None:
             return fit, prior
         loose = prior.loosen()
         starts = [fit.pose, *self._turned_pelvis(fit.pose, learned)]
         poses = [self.fit_silhouettes(start, learned, NEAR, loose) for start in starts]
-        fits = [self.fit_images([pose], learned, loose) for pose in poses if self._rises(fit, pose, learned)]
+
+        def mask_nats(pose: Pose) -> float:
+            return self.agreement(pose, learned).evidence / fit.equations.shared - self._twist_nats(pose)
+
+        least = mask_nats(fit.pose) + _RISEN_NATS
+        fits = [self.fit_images([pose], learned, loose) for pose in poses if mask_nats(pose) > least]
         return self._best_place(fit, fits, learned, prior=prior, widened=loose) if fits else (fit, prior)
 
-    def _rises(self, fit: Fit, pose: Pose, learned: LearnedRegions) -> bool:
-        """Whether a pose's mask agrees so much better than a fit's that the images may, too."""
-        here, there = (self.agreement(each, learned).evidence for each in (fit.pose, pose))
-        untwisted = LOST_NATS * (is_twisted(self.model, fit.pose) - is_twisted(self.model, pose))
-        return there > here + (_RISEN_NATS - untwisted) * fit.equations.shared
+    def _twist_nats(self, pose: Pose) -> float:
+        """Return what a twisted trunk costs [nat]."""
+        return LOST_NATS * (self.moves_joints and is_twisted(self.model, pose))
 
     def _turned_pelvis(self, pose: Pose, learned: LearnedRegions) -> list[Pose]:
-        """Return the pose with its pelvis turned, if one of these has more evidence on the reduced images.
+        """Return the pose with its pelvis turned, if that has more evidence on the reduced images.
 
         Of a twisted trunk the best is returned anyhow, maybe one with its legs exchanged.
         """
-        twisted = is_twisted(self.model, pose)
-        poses = [pose, *turn_pelvis(self.model, pose), *(turn_pelvis_back(self.model, pose) if twisted else [])]
+        poses, twisted = [pose, *turn_pelvis(self.model, pose)], is_twisted(self.model, pose)
+        poses += turn_pelvis_back(self.model, pose) if twisted else []
         bodies = [self.render_model.with_pose(each) for each in poses]
         R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
         evidence = mask_evidence(self.render_model.geometry, learned.evidence, R, t).sum(axis=1)
         if twisted:
             evidence[0] = -np.inf
         best = int(np.argmax(evidence))
-        return poses[best : best + 1] if best else []
+        return [poses[best]] if best else []
 
     def _refit_limb(
         self,

@@ -30,7 +30,7 @@ class EmptyScenes:
 
     def __init__(self, kept: Iterable[Frames], render_model: RenderModel, path: TrackedPath) -> None:
         self._images: dict[Source, list[NDArray[np.uint8]]] = {}
-        self._covered: dict[Source, list[NDArray[np.uint8]]] = {}
+        maps: dict[Source, list[NDArray[np.uint8]]] = {}
         self._tiles: dict[tuple[Source, int, int], NDArray[np.uint8]] = {}
         for frames in kept:
             row = path.row(frames.index)
@@ -46,7 +46,8 @@ class EmptyScenes:
                     posed = render_model.with_pose(path.pose_after(row, view.delay_s))
                     is_covered = (render_model.draw(posed, small).part >= 0).astype(np.uint8)
                     covered = np.asarray(cv2.dilate(is_covered, _CELL), np.uint8)
-                self._covered.setdefault(source, []).append(covered)
+                maps.setdefault(source, []).append(covered)
+        self._covered = {source: np.stack(each) for source, each in maps.items()}
 
     def behind(self, number: int, view: View, silhouette: Silhouette) -> NDArray[np.uint8] | None:
         """Return the empty scene in a silhouette's box (h, w, 3); None where too few images show it."""
@@ -56,7 +57,7 @@ class EmptyScenes:
             return None
         x0, y0, x1, y1 = silhouette.box
         height, width = silhouette.mask.shape
-        n_covered = np.array(self._covered[source]).sum(axis=0, keepdims=True, dtype=np.uint16)
+        n_covered = self._covered[source].sum(axis=0, keepdims=True, dtype=np.uint16)
         n_covered = _enlarge(n_covered, (y0, y1), (x0, x1))[0]
         n_covered = cv2.resize(n_covered, (width, height), interpolation=cv2.INTER_NEAREST)
         if np.mean(n_covered[silhouette.mask > 0] > len(images) - _FEWEST_BARE) > _MOST_HIDDEN:
@@ -74,7 +75,7 @@ class EmptyScenes:
         if (source, top, left) not in self._tiles:
             images = np.stack([image[top : top + _TILE_PX, left : left + _TILE_PX] for image in self._images[source]])
             rows, columns = (top, top + images.shape[1]), (left, left + images.shape[2])
-            covered = _enlarge(np.array(self._covered[source]), rows, columns)
+            covered = _enlarge(self._covered[source], rows, columns)
             self._tiles[source, top, left] = _upper_median(_without_body(images, covered > 0))
         return self._tiles[source, top, left]
 
