@@ -38,6 +38,30 @@ def test_a_parameter_without_freedom_stays_zero():
     assert mean[1] == 0 and covariance[1, 1] == 0
 
 
+def test_independent_noise_is_as_large_between_blocks_as_within():
+    evidence, _ = random_evidence(np.array([0.05, -0.02]), n=400, noise=0.5)
+    solution, _ = solve(evidence, np.eye(2))
+    ratio = np.sqrt(np.diag(solution.jackknife(np.eye(2))) / np.diag(solution.posterior(np.eye(2))[1]))
+    assert np.all((ratio > 0.3) & (ratio < 2))  # a standard deviation of four numbers is 40 % off, one sd
+
+
+def test_what_shows_for_some_moments_alone_is_not_sure():
+    evidence, _ = random_evidence(np.zeros(2), n=16, noise=0.1)
+    evidence.offset[:4] += evidence.by_parameter[:4, ..., 0] * 0.05  # as if the first parameter were 0.05 then
+    solution, _ = solve(evidence, np.eye(2))
+    mean, covariance, _ = solution.posterior(np.eye(2))
+    sd_by_noise, sd_by_blocks = np.sqrt(covariance[0, 0]), np.sqrt(solution.jackknife(np.eye(2))[0, 0])
+    assert mean[0] > 2.5 * sd_by_noise
+    assert mean[0] < sd_by_blocks
+
+
+def test_a_row_tells_each_block_the_same():
+    evidence, _ = random_evidence(np.array([0.05, -0.02]), noise=0.1)
+    row, value = np.array([1.0, 0.0]), 0.3
+    solution = solve(evidence, np.eye(2))[0].with_row(row, value, 1e-9)
+    assert all(abs(each.posterior(np.eye(2))[0][0] - value) < SOLVED for each in (solution, *solution.without))
+
+
 def test_a_fall_is_measured_whatever_point_of_the_body_is_tracked():
     t = np.arange(12) / 25
     angle = 5 * t

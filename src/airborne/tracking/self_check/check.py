@@ -55,8 +55,9 @@ class RunEquations:
 
     @property
     def says_causes(self) -> bool:
-        """Whether enough moments were registered."""
-        return int(np.count_nonzero(self.evidence.is_seen.any(axis=1))) >= _FEWEST_MOMENTS
+        """Whether enough moments were registered, in two views if there are two: one alone is a matter of the pose."""
+        is_seen = self.evidence.is_seen
+        return int(np.count_nonzero(is_seen.sum(axis=1) >= min(2, is_seen.shape[1]))) >= _FEWEST_MOMENTS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
