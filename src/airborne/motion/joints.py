@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OPEN_SD_RAD = 0.5  # of an angle that counts as unobserved
-_UNCERTAIN_SD_M = 0.05  # of a landmark; the same as of a whole body
+UNCERTAIN_SD_M = 0.05  # of a landmark; the same as of a whole body
 # how far a person's joint lies beside its place, along each axis, as a share of the half width of the segments that
 # meet there: the least with which 80 % of the errors of each kind of joint lie within two frames' sds, on eleven
 # synthetic people, lengths 4 % and girths 12 % off
@@ -89,7 +89,7 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
     the landmarks that hang on it uncertain.
     """
     status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
-    is_doubtful = (sd > _UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)]
+    is_doubtful = (sd > UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)]
     status[(status == JointStatus.TRACKED.value) & is_doubtful] = JointStatus.UNCERTAIN.value
     status[motion.has_pose[:, None] & np.isinf(sd)] = JointStatus.UNKNOWN.value
     return status

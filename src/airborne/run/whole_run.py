@@ -21,7 +21,8 @@ from airborne.errors import ResultError
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import falls_freely
 from airborne.motion.flight.phases import body_events
-from airborne.motion.smoothing.lost_limbs import bridge_lost_limbs, forget_moved_limbs
+from airborne.motion.smoothing.lost_limbs import bridge_lost_limbs
+from airborne.motion.smoothing.moved_joints import count_moves_as_errors, forget_moved_limbs
 from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run, invert_known, smooth_covariances
 from airborne.motion.smoothing.segments import segment_numbers, stretches
 from airborne.tracking import Estimate, Status
@@ -82,7 +83,7 @@ def fit_whole_run(
             position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
             covariance[row] = each
     fitted = replace(motion, position=position, R=R, joint_angles=angles, covariance=covariance)
-    fitted = forget_moved_limbs(model, motion, fitted)
+    fitted = count_moves_as_errors(model, motion, forget_moved_limbs(model, motion, fitted))
     return FittedRun(fitted, "skin" if images.is_skin else "ellipsoids")
 
 

@@ -6,8 +6,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from airborne.motion import Motion
-from airborne.motion.smoothing.lost_limbs import bridge_lost_limbs, forget_moved_limbs
+from airborne.motion import Motion, landmarks
+from airborne.motion.smoothing.lost_limbs import bridge_lost_limbs
+from airborne.motion.smoothing.moved_joints import count_moves_as_errors, forget_moved_limbs
 from airborne.motion.smoothing.run_fit import Stretch
 from airborne.tracking import Estimate, Status
 from airborne.tracking.model_based.degrees_of_freedom import joints_of, limbs_of
@@ -104,3 +105,23 @@ def test_limb_that_the_fit_moves_no_further_than_its_deviations_allow_stays_know
     true, vague = motion_of(TRUTH), motion_of(lose([8], turned_rad=0.4)[0], sd_rad=0.2)
     assert off_m([vague.pose(row) for row in range(N)]) > DISTINCT_M
     assert np.isfinite(np.diagonal(forget_moved_limbs(HUMAN, vague, true).covariance, axis1=1, axis2=2)).all()
+
+
+def test_what_the_fit_moves_by_more_than_its_deviation_is_at_least_as_uncertain():
+    true, turned = motion_of(TRUTH), motion_of(lose([8], turned_rad=0.3)[0])
+    doubtful = count_moves_as_errors(HUMAN, turned, true)
+    moved_m = np.linalg.norm(landmarks(turned, HUMAN)[0] - landmarks(true, HUMAN)[0], axis=-1)
+    before, after = landmarks(true, HUMAN)[1], landmarks(doubtful, HUMAN)[1]
+    assert moved_m[8].max() > 0.1
+    np.testing.assert_allclose(after[8], np.sqrt(before[8] ** 2 + moved_m[8] ** 2 / 3), rtol=0.02)  # to first order
+    others = np.arange(N) != 8
+    np.testing.assert_array_equal(after[others], before[others])
+
+
+def test_a_small_move_and_an_unknown_spin_leave_what_is_known_as_it_is():
+    near, true = motion_of(lose([8], turned_rad=0.01)[0]), motion_of(TRUTH)
+    assert np.array_equal(count_moves_as_errors(HUMAN, near, true).covariance, true.covariance)
+    true.covariance[:, COLUMNS[-1], COLUMNS[-1]] = np.inf
+    turned = motion_of(lose([8], turned_rad=0.3)[0])
+    is_known = np.isfinite(count_moves_as_errors(HUMAN, turned, true).covariance)
+    assert np.array_equal(is_known, np.isfinite(true.covariance))

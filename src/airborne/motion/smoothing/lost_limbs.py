@@ -16,15 +16,10 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from airborne.body import BodyModel, Pose
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.motion.joints import landmarks
-from airborne.motion.motion import Motion
 from airborne.motion.smoothing.run_fit import Stretch
 from airborne.tracking.model_based.degrees_of_freedom import joints_of, limbs_of
 from airborne.tracking.model_based.misplaced_limbs import DISTINCT_M, limb_points
-from airborne.tracking.model_based.support import mark_unobserved
 from airborne.types import Array
-
-_CONTRADICTED_SDS = 3.0 * np.sqrt(3.0)  # three along one axis, as sds are root mean squares over three
 
 
 def bridge_lost_limbs(
@@ -50,29 +45,6 @@ def bridge_lost_limbs(
                     if not _jumps(_places(model, others[around], limb)).any():
                         bridged = others
     return bridged
-
-
-def forget_moved_limbs(model: BodyModel, tracked: Motion, fitted: Motion) -> Motion:
-    """Return the fitted motion, without knowledge of limbs that are not where they were tracked.
-
-    A fit that moves some landmark of a limb by more than `DISTINCT_M` and by more than three sds contradicts the
-    tracker: one of them is wrong.
-    """
-    rows = np.flatnonzero(tracked.has_pose)
-    before, after = (
-        np.array([model.with_pose(motion.pose(row)).landmarks for row in rows]) for motion in (tracked, fitted)
-    )
-    moved_m = np.linalg.norm(after - before, axis=-1)
-    if not (moved_m > DISTINCT_M).any():
-        return fitted
-    contradicts = moved_m > np.maximum(DISTINCT_M, _CONTRADICTED_SDS * landmarks(tracked, model)[1][rows])
-    owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
-    covariance = fitted.covariance.copy()
-    for limb in limbs_of(model):
-        columns = joints_of(model, limb).columns
-        for row in rows[contradicts[:, np.isin(owners, limb)].any(axis=1)]:
-            covariance[row] = mark_unobserved(covariance[row], columns)
-    return replace(fitted, covariance=covariance)
 
 
 def _gaps(is_known: NDArray[np.bool_], rows: slice) -> Iterator[slice]:
