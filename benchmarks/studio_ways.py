@@ -27,7 +27,8 @@ from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import read_rig
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
-from tests.support.studio import MINUTE, User, open_page, open_studio, wait_for_frame
+from tests.support.browser import MINUTE, open_page
+from tests.support.studio import User, open_studio, wait_for_frame
 
 SURVEYED = (  # of the court, spread over length, width and height
     "far_corner_L", "near_attack_x_sideline_L", "post_foot_L", "post_top_L", "antenna_top_L", "far_corner_R",

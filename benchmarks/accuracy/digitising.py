@@ -19,8 +19,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from rows import append
 
+from tests.support.browser import open_page
 from tests.support.digitised_cross import CLICK_SD_PX, MOST_DEG, MOST_MM, TRUTH, compare, digitise, prepare_cross
-from tests.support.studio import open_page, open_studio
+from tests.support.studio import open_studio
 
 
 def main() -> None:

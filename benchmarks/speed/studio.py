@@ -34,8 +34,9 @@ from airborne.motion import PlayersWriter
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from airborne.video import VideoWriter
+from tests.support.browser import open_page
 from tests.support.person_run import PERSON, PERSON_TABLE, write_person_run
-from tests.support.studio import at_pixel, open_page, open_studio, wait_for_frame
+from tests.support.studio import at_pixel, open_studio, wait_for_frame
 
 SIZE, SMALL, RATE, NOISE = (1920, 1080), (640, 360), 50, 8
 PLACES = {"left": [3.0, -4.0, 1.5], "right": [-4.0, -3.0, 1.2], "behind": [0.5, 5.0, 1.4]}

@@ -7,7 +7,7 @@ from airborne.export.players_report import players_summary, write_players_report
 from airborne.motion import measure_jumps
 from airborne.motion.jumps.table import jump_row
 from tests.support import jumping
-from tests.support.studio import open_file
+from tests.support.browser import open_file
 
 COUNTS = {
     **{"n_tracked": 150, "n_uncertain": 0, "n_lost": 0, "n_fewer_cameras": 0, "n_below_two_cameras": 0},

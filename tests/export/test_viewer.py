@@ -12,8 +12,8 @@ from airborne.export.summary import headline
 from airborne.export.viewer import body_viewer
 from airborne.geometry.even_sample import EvenSample
 from airborne.motion.run_folder import PICTURES, videos_of
+from tests.support.browser import open_file
 from tests.support.export_scenes import PERSON, person_run
-from tests.support.studio import open_file
 
 
 @pytest.fixture(scope="module")

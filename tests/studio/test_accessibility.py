@@ -7,10 +7,11 @@ import pytest
 
 from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.evaluation import DigitisedPoints, format_clicked_frames
+from tests.support.browser import SIZE, open_page
 from tests.support.clips import write_clip
 from tests.support.layout_faults import layout_faults
 from tests.support.person_run import PERSON, PERSON_TABLE, write_person_run
-from tests.support.studio import SIZE, fork_studio, open_page
+from tests.support.studio import fork_studio
 
 VIDEO, N = (320, 240), 6  # [px], pictures
 SIZES = ((1280, 720), (3840, 2160))  # of the window

@@ -10,9 +10,10 @@ from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.io.text import read_toml
 from airborne.studio.calibrations import guess_name, list_calibrations
 from airborne.trial.file import read_trial
+from tests.support.browser import open_page
 from tests.support.clips import write_clip
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import User, fork_studio, open_page
+from tests.support.studio import User, fork_studio
 
 SIZE = (320, 240)
 SURVEY = "point,x_m,y_m,z_m\nP1,1,2,3\n"

@@ -7,8 +7,9 @@ from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.io.text import read_toml
 from airborne.run.players_tracker import player_starts
 from airborne.trial.file import read_trial
+from tests.support.browser import open_page
 from tests.support.clips import write_clip
-from tests.support.studio import User, fork_studio, open_page, wait_for_frame
+from tests.support.studio import User, fork_studio, wait_for_frame
 
 SIZE = (640, 480)
 LEGS = {

@@ -14,8 +14,9 @@ from airborne.studio.fitting import FirstPoseFit
 from airborne.studio.pages import fit_pose
 from airborne.studio.starts import standing_pose
 from airborne.trial.file import read_trial
+from tests.support.browser import open_page
 from tests.support.clips import write_clip
-from tests.support.studio import at_pixel, fork_studio, open_page, wait_for_frame, wait_for_still_scene
+from tests.support.studio import at_pixel, fork_studio, wait_for_frame, wait_for_still_scene
 
 SIZE = (640, 480)
 FRAME, N_FRAMES = 3, 6

@@ -15,8 +15,9 @@ from airborne.motion.run_folder import read_summary
 from airborne.run.track import track_trial
 from airborne.tracking.estimate import lost_estimate
 from airborne.trial.file import read_trial
+from tests.support.browser import MINUTE, open_page
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import MINUTE, at_pixel, fork_studio, go_home, open_page, wait_for_frame, wait_for_still_scene
+from tests.support.studio import at_pixel, fork_studio, go_home, wait_for_frame, wait_for_still_scene
 
 FRAME, TURNED, LOST, LAST, CAMERA, DRAGGED_PX = 3, 4, 5, 6, 1, (16.0, -12.0)
 

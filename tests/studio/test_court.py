@@ -6,8 +6,9 @@ import pytest
 
 from airborne.io.text import read_toml
 from airborne.studio.clicks import read_clicked
+from tests.support.browser import open_page
 from tests.support.clips import textured, write_clip
-from tests.support.studio import at_pixel, fork_studio, open_page, wait_for_frame
+from tests.support.studio import at_pixel, fork_studio, wait_for_frame
 
 
 def test_a_court_becomes_a_table_whose_points_are_clicked(tmp_path):

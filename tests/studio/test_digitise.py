@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from airborne.evaluation import read_digitised
+from tests.support.browser import open_page
 from tests.support.digitised_cross import MOST_DEG, MOST_MM, POINTS, compare, digitise, prepare_cross
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import at_pixel, fork_studio, open_page, wait_for_frame
+from tests.support.studio import at_pixel, fork_studio, wait_for_frame
 
 FRAMES = range(0, 16, 4)
 GREY = "#c8cdd3"  # of marks where a point is expected

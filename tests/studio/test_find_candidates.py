@@ -13,8 +13,9 @@ from airborne.run.first_pose import find_first_pose
 from airborne.studio import commands
 from airborne.studio.session import Session
 from airborne.studio.starts import FOUND_LIST, FOUND_PICTURE, pose_of
+from tests.support.browser import open_page
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import User, fork_studio, open_page, wait_for_frame
+from tests.support.studio import User, fork_studio, wait_for_frame
 
 SHARES = (0.6, 0.4)
 SIZE = (60, 40)

@@ -9,7 +9,8 @@ from airborne.studio.outlines import legs_items
 from airborne.studio.trial_edits import with_players
 from airborne.trial.file import read_trial
 from tests.studio.test_click_players import LEGS, TRIAL, folder, rig  # noqa: F401
-from tests.support.studio import User, fork_studio, open_page, wait_for_frame
+from tests.support.browser import open_page
+from tests.support.studio import User, fork_studio, wait_for_frame
 
 
 def test_the_players_of_an_answer_are_those_of_the_trial(rig, folder):  # noqa: F811

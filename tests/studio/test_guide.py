@@ -2,7 +2,8 @@
 
 from airborne.studio.guide import next_task
 from airborne.studio.project import find_trial, read_project, steps
-from tests.support.studio import fork_studio, open_page
+from tests.support.browser import open_page
+from tests.support.studio import fork_studio
 
 
 def test_the_walk_goes_from_step_to_step(tmp_path):

@@ -12,9 +12,10 @@ from airborne.motion.files import read_estimates
 from airborne.studio.pages import review
 from airborne.studio.strips import doubtful_frames
 from airborne.tracking import Status
+from tests.support.browser import open_page
 from tests.support.person_run import write_person_run
 from tests.support.players_trial import rig, write_run, write_trial
-from tests.support.studio import fork_studio, go_home, open_page, wait_for_frame
+from tests.support.studio import fork_studio, go_home, wait_for_frame
 
 N, STRAINED, LOST = 12, 3, 9
 

@@ -10,8 +10,9 @@ from airborne.io.text import read_toml
 from airborne.studio.clicks import read_clicked
 from airborne.studio.pages import jumps
 from airborne.studio.pages.layout import _KEYS
+from tests.support.browser import open_page
 from tests.support.players_trial import write_trial
-from tests.support.studio import at_pixel, fork_studio, open_page, wait_for_frame
+from tests.support.studio import at_pixel, fork_studio, wait_for_frame
 
 NAMES = {
     "←": ["ArrowLeft"],

@@ -11,8 +11,9 @@ import pytest
 from airborne.io.text import read_json
 from airborne.studio.drafts import DRAFTS
 from airborne.studio.things import parse_thing
+from tests.support.browser import open_page
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import at_pixel, fork_studio, kill_studio, open_page
+from tests.support.studio import at_pixel, fork_studio, kill_studio
 
 OLD_S, BUSY_S = 2.0, (0.5, 4.0)  # what may be lost; how much longer someone works until the studio is killed
 PATIENCE_MS = 5000  # with a studio that may be killed

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.support.studio import fork_studio, open_page
+from tests.support.browser import open_page
+from tests.support.studio import fork_studio
 
 ALL = "First come Videos, Cameras, Body"
 PAGES = {

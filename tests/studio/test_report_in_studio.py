@@ -16,8 +16,9 @@ from airborne.export.viewer import body_viewer
 from airborne.motion.run_folder import JOINTS, MOTION, PICTURES, REPORT, videos_of
 from tests.export.test_players_report import summary_of
 from tests.support import jumping
+from tests.support.browser import open_page
 from tests.support.export_scenes import PERSON, person_run
-from tests.support.studio import fork_studio, open_page
+from tests.support.studio import fork_studio
 
 ASK = """async ([own, other]) => {
     const tries = {}, once = (element, name) => new Promise((done) => {

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.support.studio import open_file
+from tests.support.browser import open_file
 
 PAGE = """<!doctype html><title>elsewhere</title>
 <img src="http://192.0.2.1/picture.png" onerror="document.title = 'nothing came'">

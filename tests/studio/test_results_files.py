@@ -8,8 +8,9 @@ import pytest
 
 from airborne.cameras import Rig, camera_looking_at
 from airborne.video import VideoWriter
+from tests.support.browser import MINUTE, open_page
 from tests.support.person_run import write_person_run
-from tests.support.studio import MINUTE, fork_studio, open_page
+from tests.support.studio import fork_studio
 
 SIZE, N, RATE = (320, 240), 12, Fraction(50)
 

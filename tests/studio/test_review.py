@@ -9,9 +9,10 @@ import pytest
 
 from airborne.cameras import Rig, camera_looking_at
 from airborne.studio.outlines import BESIDE_COLOUR
+from tests.support.browser import open_page
 from tests.support.clips import write_clip
 from tests.support.person_run import PERSON_TABLE, write_person_run
-from tests.support.studio import fork_studio, go_home, open_page, wait_for_frame
+from tests.support.studio import fork_studio, go_home, wait_for_frame
 
 SIZE, N, RATE = (320, 240), 10, Fraction(50)
 UNCERTAIN = 7  # the only such frame

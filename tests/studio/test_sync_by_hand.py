@@ -7,8 +7,9 @@ import pytest
 
 from airborne.cameras import write_pose2sim
 from airborne.io.text import read_toml
+from tests.support.browser import MINUTE, open_page
 from tests.support.clips import plain_rig, write_clip
-from tests.support.studio import MINUTE, burn_numbers, fork_studio, open_page
+from tests.support.studio import burn_numbers, fork_studio
 
 RATES, N = {"first": Fraction(25), "second": Fraction(50)}, 40
 EVENTS = ((10, 30), (20, 50))  # pictures of each

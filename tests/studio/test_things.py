@@ -12,8 +12,9 @@ from airborne.body.files import read_body
 from airborne.errors import BodyError
 from airborne.io.text import read_toml
 from airborne.studio.things import Solid, check_thing, colour_at, parse_thing, thing_text
+from tests.support.browser import open_page
 from tests.support.places import THROWN_CROSS
-from tests.support.studio import User, at_pixel, fork_studio, open_page, wait_for_frame
+from tests.support.studio import User, at_pixel, fork_studio, wait_for_frame
 
 BOX = Solid("bar", "box", (60.0, 900.0, 45.0), (0.0, 10.0, 0.0), (0.0, 0.0, 90.0), colour=(231, 200, 48))
 YELLOW_PX = (313, 354)  # of the cross at frame 0

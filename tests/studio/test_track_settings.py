@@ -4,9 +4,10 @@ import shutil
 
 from airborne.io.text import read_toml
 from airborne.trial.settings import PLAYERS_METHODS
+from tests.support.browser import open_page
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import write_run, write_trial
-from tests.support.studio import fork_studio, open_page, wait_for_frame
+from tests.support.studio import fork_studio, wait_for_frame
 
 N, LAST = 6, 3
 

@@ -9,8 +9,9 @@ from airborne.io.text import read_toml
 from airborne.studio.clicks import read_clicked
 from airborne.video import VideoSource, VideoWriter, weave
 from airborne.video.seeking import index_images
+from tests.support.browser import open_page
 from tests.support.clips import write_clip
-from tests.support.studio import at_pixel, burn_numbers, fork_studio, go_home, open_page, read_number, wait_for_frame
+from tests.support.studio import at_pixel, burn_numbers, fork_studio, go_home, read_number, wait_for_frame
 
 N = 120  # fields, which are the clock
 N_PLAIN = 100  # pictures of the file without B frames, which ends before the others

@@ -7,8 +7,9 @@ import pytest
 from airborne.studio.commands import Command
 from airborne.studio.pages import body, cameras, results
 from airborne.studio.session import Session
+from tests.support.browser import open_page
 from tests.support.players_trial import write_run, write_trial
-from tests.support.studio import fork_studio, open_page, wait_for_frame
+from tests.support.studio import fork_studio, wait_for_frame
 
 SLOW_S = 1.5  # what a read takes in these tests
 

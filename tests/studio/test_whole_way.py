@@ -18,8 +18,9 @@ from airborne.motion import read_motion
 from airborne.run.track import track_trial
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.file import read_trial
+from tests.support.browser import MINUTE, open_page
 from tests.support.places import ROOT, THROWN_CROSS
-from tests.support.studio import MINUTE, User, open_page, open_studio, wait_for_frame
+from tests.support.studio import User, open_studio, wait_for_frame
 
 MOST_CLICKS = 60
 N_POINTS = 12  # surveyed points that are clicked in all three cameras

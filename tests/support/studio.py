@@ -1,9 +1,8 @@
-"""The studio as a process, and a browser that looks at it, or at a report."""
+"""The studio as a process, and its pages in a browser."""
 
 import multiprocessing
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +13,6 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-import pytest
 
 from airborne.cli import main
 from airborne.io.folder_lock import LOCK
@@ -24,13 +22,6 @@ RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(["airborne.cli", "airborne.studio.server"])
 _NAME = "MainProcess"  # of a process in which NiceGUI serves
-# the first needs three quarters of the others' time: it is the same without a window
-BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
-SIZE = {"width": 1280, "height": 720}
-MINUTE = 60_000  # ms
-TIMEOUT_MS = 3 * MINUTE  # of a busy machine
-NO_PROXY = "http://127.0.0.1:9"  # where nothing listens; the loopback itself needs none
-BROWSER_FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", f"--proxy-server={NO_PROXY}"]
 CLICK_SD_PX = 1.0  # of a user's clicks, right and down
 N_BITS, BLOCK_PX = 10, 24  # of numbers burnt into pictures
 
@@ -95,57 +86,6 @@ def _run_command(
         before()
     sys.argv = ["airborne", *words]
     main()
-
-
-@contextmanager
-def open_page(address: str, requests: list[str] | None = None) -> Iterator:
-    """Open an address in a real browser; skip without one. A request or socket to elsewhere fails the test.
-
-    `requests` takes the addresses that are asked for.
-    """
-    host = address.split("/")[2]
-    with _browser_page(lambda url: url.split("/")[2] == host, [] if requests is None else requests) as page:
-        page.goto(address)
-        yield page
-
-
-@contextmanager
-def open_file(path: Path) -> Iterator:
-    """Open a page from a file in a real browser; skip without one. Any request fails the test."""
-    with _browser_page(lambda url: False, []) as page:
-        page.goto(path.absolute().as_uri())
-        yield page
-
-
-@contextmanager
-def _browser_page(is_allowed: Callable[[str], bool], requests: list[str]) -> Iterator:
-    reason = "THE STUDIO IS NOT TESTED IN A BROWSER: playwright is not installed; pip install -e '.[test]'"
-    playwright = pytest.importorskip("playwright.sync_api", reason=reason)
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
-        pytest.skip("THE STUDIO IS NOT TESTED IN A BROWSER: no Chromium is installed; apt-get install chromium")
-    with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=browser, args=BROWSER_FLAGS)
-        context = chromium.new_context(viewport=SIZE)
-        errors: list[str] = []
-
-        def note(url: str) -> None:
-            if re.match("https?:|wss?:", url):
-                requests.append(url)
-                if not is_allowed(url):
-                    errors.append(f"a request to {url}")
-
-        # listen only: a route would keep caches from use; what a policy of the page stops leaves nothing
-        context.on("response", lambda response: note(response.url))
-        context.on("requestfailed", lambda request: None if request.failure == "csp" else note(request.url))
-        context.on("page", lambda each: each.on("websocket", lambda socket: note(socket.url)))
-        context.set_default_timeout(TIMEOUT_MS)
-        page = context.new_page()
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-        yield page
-        assert not errors, errors
-        chromium.close()
 
 
 def go_home(page) -> None:
