@@ -41,6 +41,6 @@ def test_an_exponent_is_found_beside_a_fixed_cost(power):
 
 
 def test_the_scaling_benchmark_runs(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["scaling.py", "--quick", "--only", "segments"])
+    monkeypatch.setattr(sys, "argv", ["scaling.py", "--quick", "--only", "picture"])
     main()
     assert "exponent" in capsys.readouterr().out

@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -60,9 +61,13 @@ class TrackedRun:
             for k in range(N)
         ]
 
-    def fit(self, estimates=None, keys=()):
+    @cached_property
+    def fitted(self):
+        """What the fit makes of the run as it is."""
+        return self.fit(self.estimates)
+
+    def fit(self, estimates, keys=()):
         """The motion as tracked, and what the fit of the whole run makes of it."""
-        estimates = estimates or self.estimates
         motion = Motion.collect(estimates, tuple(segment.name for segment in self.model.segments[1:]))
         reader = Rereading(open_trial(self.trial).recording)
         return motion, fit_whole_run(reader, self.trial.settings, self.model, motion, estimates, keys=keys)
@@ -78,8 +83,16 @@ def run(tmp_path_factory):
     return TrackedRun(scene_of("ellipsoids"), tmp_path_factory.mktemp("somersault"))
 
 
+@pytest.fixture(scope="module")
+def whole(run, tmp_path_factory):
+    """The folder of the run by the command line, which nobody changes."""
+    folder = tmp_path_factory.mktemp("runs") / "whole"
+    assert in_process("track", run.file, "-o", folder, "--no-pictures") == 0
+    return folder
+
+
 def test_joints_err_less_than_frame_by_frame_and_say_so(run):
-    tracked, fitted = run.fit()
+    tracked, fitted = run.fitted
     assert run.error_m(fitted.motion) < 0.5 * run.error_m(tracked)
     assert fitted.surface == "ellipsoids"
     before, after = (np.trace(each.covariance[:, :3, :3], axis1=1, axis2=2) for each in (tracked, fitted.motion))
@@ -89,16 +102,16 @@ def test_joints_err_less_than_frame_by_frame_and_say_so(run):
 
 def test_a_person_is_compared_in_a_skin(tmp_path):
     run = TrackedRun(scene_of("skin"), tmp_path)
-    tracked, fitted = run.fit()
+    tracked, fitted = run.fitted
     assert run.error_m(fitted.motion) < 0.6 * run.error_m(tracked)
     assert fitted.surface == "skin"
 
 
 def test_windows_fit_nearly_what_the_whole_run_does(run, monkeypatch):
-    tracked, whole = run.fit()
+    tracked, whole = run.fitted
     monkeypatch.setattr(whole_run, "_WINDOW", 5)
     monkeypatch.setattr(whole_run, "_MARGIN", 4)
-    _, windows = run.fit()
+    _, windows = run.fit(run.estimates)
     apart = np.linalg.norm(landmarks(windows.motion, run.model)[0] - landmarks(whole.motion, run.model)[0], axis=-1)
     assert 0 < apart.mean() < 0.2 * run.error_m(tracked)
 
@@ -123,9 +136,8 @@ def test_what_no_image_shows_stays_unknown_and_a_run_too_short_as_it_is(run):
     assert run.fit(run.estimates[:4])[1] is None
 
 
-def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked(run, tmp_path):
-    whole, again = tmp_path / "whole", tmp_path / "again"
-    assert in_process("track", run.file, "-o", whole, "--no-pictures") == 0
+def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked(run, whole, tmp_path):
+    again = tmp_path / "again"
     tracked, fitted = read_motion(whole / TRACKED_MOTION), read_motion(whole / MOTION)
     assert np.linalg.norm(fitted.position - tracked.position, axis=1).max() > 1e-4
     shutil.copytree(whole, again)
@@ -136,9 +148,9 @@ def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked
         assert (again / name).read_bytes() == (whole / name).read_bytes()
 
 
-def test_a_refused_resume_leaves_a_fitted_run_as_it_is(run, tmp_path, capsys):
+def test_a_refused_resume_leaves_a_fitted_run_as_it_is(run, whole, tmp_path, capsys):
     folder, other = tmp_path / "run", run.file.with_name("other.toml")
-    assert in_process("track", run.file, "-o", folder, "--no-pictures") == 0
+    shutil.copytree(whole, folder)
     before = contents_of(folder)
     text = run.file.read_text(encoding="utf-8")
     other.write_text(text.replace("[track]\n", '[track]\nprediction = "none"\n'), encoding="utf-8")
