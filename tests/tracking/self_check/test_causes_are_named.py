@@ -1,6 +1,7 @@
 """A wrong body, camera or clock is named with its size; a run with nothing wrong raises no alarm."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -24,7 +25,12 @@ def flung(time_s):
 
 SCENE = Scene(motion=flung, cameras=CAMERAS[:3])
 INDICES = range(24)
-FRAMES = [SCENE.frames(index) for index in INDICES]
+
+
+@cache
+def frames_seen():
+    """The pictures of all instants."""
+    return [SCENE.frames(index) for index in INDICES]
 
 
 def seen_by(rig: Rig, frames: Frames) -> Frames:
@@ -38,12 +44,12 @@ RIG = Rig(SCENE.cameras)
 
 def checked(*, rig=RIG, model=CROSS, late_s=0.0):
     """Check true poses against the pictures, with wrong files; `late_s` of what the second camera shows."""
-    frames = FRAMES
+    frames = frames_seen()
     if late_s:
         shift = round(late_s * FPS)
         frames = [
             replace(now, views=(now.views[0], later.views[1], now.views[2]))
-            for now, later in zip(FRAMES, FRAMES[shift:], strict=False)
+            for now, later in zip(frames, frames[shift:], strict=False)
         ]
     frames = [seen_by(rig, each) for each in frames]
     poses = [SCENE.start(each.index) for each in frames]
@@ -106,7 +112,7 @@ def test_intervals_widen_by_what_is_wrong():
 
 def test_a_mask_that_shrinks_over_an_unchanged_picture_is_doubtful():
     start = SCENE.start(0)
-    still = [replace(FRAMES[0], index=i) for i in range(8)]
+    still = [replace(frames_seen()[0], index=i) for i in range(8)]
     far = [start.move(0.5 * i * np.array([0.0, 1.0, 0.0]), np.zeros(3)) for i in range(8)]
     path = TrackedPath(np.arange(8), np.arange(8) / FPS, far, np.zeros((8, 6, 6)))
     found = doubts(CROSS, path, [replace(f, views=f.views[:1]) for f in still], start, None)
@@ -117,4 +123,4 @@ def test_a_mask_that_shrinks_over_an_unchanged_picture_is_doubtful():
 def test_a_body_that_really_leaves_is_not_doubtful():
     poses = [SCENE.start(i) for i in INDICES]
     path = TrackedPath(np.arange(24), np.arange(24) / FPS, poses, np.zeros((24, 6, 6)))
-    assert not any(each.any() for each in doubts(CROSS, path, FRAMES, poses[0], None).values())
+    assert not any(each.any() for each in doubts(CROSS, path, frames_seen(), poses[0], None).values())
