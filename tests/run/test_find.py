@@ -35,6 +35,18 @@ def path(tmp_path_factory):
     return folder / "trial.toml"
 
 
+def once(function):
+    """A function that is done at the first of its calls, all of which are about the same trial."""
+    done = []
+
+    def remembered(*given):
+        if not done:
+            done.append(function(*given))
+        return done[0]
+
+    return remembered
+
+
 def cli(monkeypatch, *words):
     """Run the command line; return its exit code."""
     monkeypatch.setattr("sys.argv", ["airborne", *map(str, words)])
@@ -73,17 +85,17 @@ def test_a_trial_without_a_start_is_tracked_and_says_how_it_began(path, tmp_path
 
 
 def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp_path, monkeypatch, capsys):
-    decide, findings = find.find_thing, []
+    decide = once(find.find_thing)
 
     def undecided(model, moments):
-        if not findings:  # the trial stays the same
-            findings.append(decide(model, moments))
-        (finding,) = findings
+        finding = decide(model, moments)
         first = finding.candidates[0]
         other = replace(first, pose=first.pose.move(np.array([0, 0, 0.3]), np.zeros(3)), probability=0.4)
         return replace(finding, candidates=(replace(first, probability=0.6), other))
 
     monkeypatch.setattr(find, "find_thing", undecided)
+    for name in ("empty_scenes", "look"):
+        monkeypatch.setattr(find, name, once(getattr(find, name)))
     out = tmp_path / "out"
     assert cli(monkeypatch, "track", path, "-o", out) == 3
     said = " ".join(capsys.readouterr().err.split())
