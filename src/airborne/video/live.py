@@ -16,7 +16,7 @@ from airborne.errors import VideoError
 from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, facts_of, intact_frames, snap_to_grid
 from airborne.video.frames import Frames, View
 from airborne.video.lazy import ConversionCache, lazy_view
-from airborne.video.recording import check_sizes
+from airborne.video.sizes import check_sizes
 from airborne.video.sources import POLL_S, SourceKind, is_stdin, kind_of, open_source
 from airborne.video.undistortion import Undistortion, undistortion_of
 

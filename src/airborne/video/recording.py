@@ -17,6 +17,7 @@ from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
 from airborne.video.lazy import ConversionCache, lazy_view
 from airborne.video.prefetch import read_ahead
+from airborne.video.sizes import check_sizes
 from airborne.video.undistortion import Undistortion, undistortion_of
 
 FieldsAs = Literal["rows", "interpolated"]
@@ -186,17 +187,6 @@ def open_recording(
     recording = Recording(ordered, ordered_facts, rig, fields_as, every, start, stop, lazy)
     recording.events.extend(_notes(ordered, ordered_facts))
     return recording
-
-
-def check_sizes(sources: Sequence[VideoSource], rig: Rig, facts: Sequence[VideoFacts]) -> None:
-    """Raise VideoError where the size of a video's images differs from its camera's in the calibration."""
-    for source, camera, fact in zip(sources, rig, facts, strict=True):
-        if fact.size != tuple(camera.size):
-            actual, expected = ("×".join(map(str, size)) for size in (fact.size, camera.size))
-            raise VideoError(
-                f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px; "
-                "give the video that was calibrated, or the calibration of this size"
-            )
 
 
 def _check_exposures(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> None:

@@ -1,0 +1,34 @@
+"""A video of another size than its calibration is refused, and the mend is the one that fits the two sizes."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from airborne.cameras import Rig
+from airborne.errors import VideoError
+from airborne.video.decoding import VideoSource
+from airborne.video.sizes import check_sizes
+from tests.support.scenes import CAMERAS
+
+
+@pytest.mark.parametrize(
+    ("factor", "mend"),
+    [
+        ((0.5, 0.5), "saved_scale = 2 and saved_offset_px = [0.5, 0.5]"),
+        ((1.5, 1.5), "saved_scale = 0.666667 and saved_offset_px = [-0.166667, -0.166667]"),
+        ((0.75, 0.5), "saved_offset_px, where its first"),
+        ((1.25, 0.5), None),
+    ],
+)
+def test_mend_of_a_size(factor, mend):
+    camera = CAMERAS[0]
+    size = tuple(round(f * length) for f, length in zip(factor, camera.size, strict=True))
+    with pytest.raises(VideoError, match="give the video that was calibrated") as error:
+        check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [SimpleNamespace(size=size)])
+    assert "\n" not in str(error.value)
+    assert mend in str(error.value) if mend else "saved_" not in str(error.value)
+
+
+def test_the_calibrated_size_passes():
+    camera = CAMERAS[0]
+    check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [SimpleNamespace(size=camera.size)])
