@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
-from airborne.rendering import mask_evidence
 from airborne.tracking.model_based.degrees_of_freedom import (
     DegreesOfFreedom,
     PosePrior,
@@ -42,7 +41,7 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
-from airborne.tracking.model_based.turned_pelvis import is_twisted, turn_pelvis, turn_pelvis_back
+from airborne.tracking.model_based.turned_pelvis import find_turned_pelvis, is_twisted, turn_pelvis_back, turned_columns
 from airborne.tracking.model_based.uncovered import find_uncovered
 from airborne.types import Array
 
@@ -205,38 +204,40 @@ class Fitter:
         return faults
 
     def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
-        """Fit everything again, to images where the mask rises, freer of what was expected; return the better fit."""
+        """Fit everything again, freer of what was expected, and a twisted trunk from where it may have come from."""
         if prior is None:
             return fit, prior
         loose = prior.loosen()
-        starts = [fit.pose, *self._turned_pelvis(fit.pose, learned)]
-        poses = [self.fit_silhouettes(start, learned, NEAR, loose) for start in starts]
+        starts = [fit.pose, *find_turned_pelvis(self.render_model, fit.pose, learned.evidence)]
+        fit, prior = self._refit_from(starts, fit, learned, prior=prior, widened=loose)
+        if not is_twisted(self.model, fit.pose):
+            return fit, prior
+        back, free = turn_pelvis_back(self.model, fit.pose), loose.widen(turned_columns(self.model))
+        return self._refit_from(back, fit, learned, prior=prior, widened=free, n_lost=2)
+
+    def _refit_from(
+        self,
+        starts: Sequence[Pose],
+        fit: Fit,
+        learned: LearnedRegions,
+        *,
+        prior: PosePrior | None,
+        widened: PosePrior,
+        n_lost: int = 1,
+    ) -> tuple[Fit, PosePrior | None]:
+        """Fit masks from several starts, and the images from those that rise; return the best fit."""
+        poses = [self.fit_silhouettes(start, learned, NEAR, widened) for start in starts]
 
         def mask_nats(pose: Pose) -> float:
             return self.agreement(pose, learned).evidence / fit.equations.shared - self._twist_nats(pose)
 
         least = mask_nats(fit.pose) + _RISEN_NATS
-        fits = [self.fit_images([pose], learned, loose) for pose in poses if mask_nats(pose) > least]
-        return self._best_place(fit, fits, learned, prior=prior, widened=loose) if fits else (fit, prior)
+        fits = [self.fit_images([pose], learned, widened) for pose in poses if mask_nats(pose) > least]
+        return self._best_place(fit, fits, learned, prior=prior, widened=widened, n_lost=n_lost)
 
     def _twist_nats(self, pose: Pose) -> float:
         """Return what a twisted trunk costs [nat]."""
         return LOST_NATS * (self.moves_joints and is_twisted(self.model, pose))
-
-    def _turned_pelvis(self, pose: Pose, learned: LearnedRegions) -> list[Pose]:
-        """Return the pose with its pelvis turned, if that has more evidence on the reduced images.
-
-        Of a twisted trunk the best is returned anyhow, maybe one with its legs exchanged.
-        """
-        poses, twisted = [pose, *turn_pelvis(self.model, pose)], is_twisted(self.model, pose)
-        poses += turn_pelvis_back(self.model, pose) if twisted else []
-        bodies = [self.render_model.with_pose(each) for each in poses]
-        R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
-        evidence = mask_evidence(self.render_model.geometry, learned.evidence, R, t).sum(axis=1)
-        if twisted:
-            evidence[0] = -np.inf
-        best = int(np.argmax(evidence))
-        return [poses[best]] if best else []
 
     def _refit_limb(
         self,
@@ -274,14 +275,14 @@ class Fitter:
         *,
         prior: PosePrior | None,
         widened: PosePrior | None,
+        n_lost: int = 1,
     ) -> tuple[Fit, PosePrior | None]:
-        """Return a fit, or another that is better though it is not where it was expected, each with its prior."""
-        misfit = min(each.equations.misfit for each in (fit, *others))
-        costs = [self.place_cost(each, learned, misfit, widened) + LOST_NATS for each in others]
-        stays = self.place_cost(fit, learned, misfit, prior)
-        stays = min(stays, self.place_cost(fit, learned, misfit, widened) + LOST_NATS)
+        """Return a fit, or one that is better with n limbs away from where they were expected, each with its prior."""
+        misfit, lost = min(each.equations.misfit for each in (fit, *others)), n_lost * LOST_NATS
+        costs = [self.place_cost(each, learned, misfit, widened) + lost for each in (fit, *others)]
+        stays = min(self.place_cost(fit, learned, misfit, prior), costs[0])
         best = int(np.argmin(costs))
-        return (others[best], widened) if costs[best] < stays else (fit, prior)
+        return ((fit, *others)[best], widened) if costs[best] < stays else (fit, prior)
 
     def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
         model = self.render_model

@@ -14,8 +14,10 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import joint_angles_of
 from airborne.geometry.rotations import matrix_from_angles
-from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment, limbs_of
+from airborne.rendering import EvidenceMaps, mask_evidence
+from airborne.tracking.model_based.degrees_of_freedom import joints_of, limb_of_segment, limbs_of
 from airborne.tracking.model_based.left_right_swap import counterparts
+from airborne.tracking.model_based.render_model import RenderModel
 
 _TURNS_RAD = np.radians([-60, -40, -20, 20, 40, 60])  # about the long axis; further, a leg would cross the other
 # with which the legs are exchanged: every 30 degrees, half of which a fit makes up for
@@ -29,9 +31,28 @@ def turn_pelvis(model: BodyModel, pose: Pose) -> list[Pose]:
     return [_turn(model, pose, angle, np.arange(len(model.segments))) for angle in _TURNS_RAD]
 
 
+def find_turned_pelvis(render_model: RenderModel, pose: Pose, maps: EvidenceMaps) -> list[Pose]:
+    """Return the pose with its pelvis turned, if that has more evidence on the reduced images, or it is twisted."""
+    poses = [pose, *turn_pelvis(render_model.model, pose)]
+    bodies = [render_model.with_pose(each) for each in poses]
+    R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
+    evidence = mask_evidence(render_model.geometry, maps, R, t).sum(axis=1)
+    if is_twisted(render_model.model, pose):
+        evidence[0] = -np.inf
+    best = int(np.argmax(evidence))
+    return [poses[best]] if best else []
+
+
 def turn_pelvis_back(model: BodyModel, pose: Pose) -> list[Pose]:
     """Return poses with the root turned further; limbs on it aim where their counterparts did, turned like these."""
     return [_turn(model, pose, angle, counterparts(model)) for angle in _TURNS_BACK_RAD]
+
+
+def turned_columns(model: BodyModel) -> NDArray[np.int64]:
+    """Return the degrees of freedom that turning the pelvis changes: the root's rotation, trunk and limbs on it."""
+    segments = np.flatnonzero(limb_of_segment(model) < 0)[1:]
+    limbs = [limb for limb in limbs_of(model) if model.parents[limb[0]] == 0]
+    return np.concatenate([np.arange(3, 6), joints_of(model, np.concatenate([segments, *limbs])).columns])
 
 
 def is_twisted(model: BodyModel, pose: Pose) -> bool:
