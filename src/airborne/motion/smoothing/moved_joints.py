@@ -13,7 +13,6 @@ from airborne.motion.motion import Motion
 from airborne.tracking.model_based.degrees_of_freedom import joints_of, limbs_of
 from airborne.tracking.model_based.misplaced_limbs import DISTINCT_M
 from airborne.tracking.model_based.support import mark_unobserved
-from airborne.types import Array
 
 _CONTRADICTED_SDS = 3.0 * np.sqrt(3.0)  # three along one axis, as sds are root mean squares over three
 
@@ -24,8 +23,9 @@ def forget_moved_limbs(model: BodyModel, tracked: Motion, fitted: Motion) -> Mot
     A fit that moves some landmark of a limb by more than `DISTINCT_M` and by more than three sds contradicts the
     tracker: one of them is wrong.
     """
-    moved_m = _moved_m(model, tracked, fitted)
-    contradicts = moved_m > np.maximum(DISTINCT_M, _CONTRADICTED_SDS * landmarks(tracked, model)[1])
+    before, sd_m = landmarks(tracked, model)
+    moved_m = np.linalg.norm(landmarks(fitted, model)[0] - before, axis=-1)
+    contradicts = moved_m > np.maximum(DISTINCT_M, _CONTRADICTED_SDS * sd_m)
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
     covariance = fitted.covariance.copy()
     for limb in limbs_of(model):
@@ -44,8 +44,8 @@ def count_moves_as_errors(model: BodyModel, tracked: Motion, fitted: Motion) -> 
     views, of whom the stature alone was known, 4 % of the joints that it had moved by less than 20 mm were 0.1 m off or
     more, and 34 % of those that it had moved by more than 60 mm.
     """
-    moved_m, sd_m = _moved_m(model, tracked, fitted), landmarks(fitted, model)[1]
-    tracked_sd_m = landmarks(tracked, model)[1]
+    (before, tracked_sd_m), (after, sd_m) = landmarks(tracked, model), landmarks(fitted, model)
+    moved_m = np.linalg.norm(after - before, axis=-1)
     is_badly_seen = (tracked_sd_m > UNCERTAIN_SD_M) | (moved_m > _CONTRADICTED_SDS * tracked_sd_m)
     covariance = fitted.covariance.copy()
     for row in np.flatnonzero((is_badly_seen & (moved_m > np.sqrt(3) * sd_m)).any(axis=1)):
@@ -53,12 +53,3 @@ def count_moves_as_errors(model: BodyModel, tracked: Motion, fitted: Motion) -> 
         moved[~np.isfinite(np.diagonal(covariance[row]))] = 0
         covariance[row] += np.outer(moved, moved)
     return replace(fitted, covariance=covariance)
-
-
-def _moved_m(model: BodyModel, tracked: Motion, fitted: Motion) -> Array:
-    """Return how far landmarks were moved: (n, landmarks) [m]; 0 without a pose."""
-    moved_m = np.zeros((len(tracked), len(model.landmarks)))
-    for row in np.flatnonzero(tracked.has_pose):
-        before, after = (model.with_pose(motion.pose(row)).landmarks for motion in (tracked, fitted))
-        moved_m[row] = np.linalg.norm(after - before, axis=-1)
-    return moved_m

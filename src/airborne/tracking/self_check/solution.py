@@ -15,7 +15,7 @@ _LEAST_NOISE = np.array([0.15, 0.15, np.radians(0.1), 0.002])
 _STRAY = np.array([np.inf, np.inf, 0.15, 0.1])  # a view's turn and scale farther from its median are mistakes
 _ROUNDS = 4  # of estimating the noise and the weights of views that do not fit
 _CLIP = 3.0  # residuals beyond so many sds lose weight
-_N_BLOCKS = 4  # of moments one after the other: a limb that is wrongly placed stays so for some moments, rarely longer
+N_BLOCKS = 4  # of moments one after the other: a limb that is wrongly placed stays so for some moments, rarely longer
 _POSE_SD = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 1.0])  # hold what no view shows [m, rad]
 
 
@@ -113,7 +113,7 @@ def solve(evidence: Evidence, wide: Array) -> tuple[NuisanceSolution, Array]:
 def _without_blocks(evidence: Evidence, weights: Array) -> list[NuisanceSolution]:
     """Accumulate the equations without each block of the moments that show something."""
     solutions = []
-    for block in np.array_split(np.flatnonzero(weights.any(axis=(1, 2))), _N_BLOCKS):
+    for block in np.array_split(np.flatnonzero(weights.any(axis=(1, 2))), N_BLOCKS):
         kept = np.ones(len(weights), bool)
         kept[block] = False
         solutions.append(_accumulate(evidence.select(kept), weights[kept]))

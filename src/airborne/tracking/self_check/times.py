@@ -7,11 +7,11 @@ import numpy as np
 from airborne.cameras import Rig
 from airborne.tracking.self_check.check import RunEquations
 from airborne.tracking.self_check.nuisances import nuisances_of, widen
+from airborne.tracking.self_check.solution import N_BLOCKS
 from airborne.types import Array
 
 # what straight-line motion and constant biases leave open: the likeliest by the late cameras of 13 synthetic throws
 _MODEL_SD_S = 0.0002
-_FEWEST_MOMENTS = 8  # two in each block that is left out
 
 
 def camera_times(run: RunEquations, rig: Rig) -> tuple[Array, Array] | None:
@@ -20,7 +20,7 @@ def camera_times(run: RunEquations, rig: Rig) -> tuple[Array, Array] | None:
     None where too little was registered, in any of the cameras.
     """
     is_seen = run.evidence.is_seen
-    if not run.says_causes or len(is_seen) < _FEWEST_MOMENTS or not is_seen.any(axis=0).all():
+    if not run.says_causes or len(is_seen) < 2 * N_BLOCKS or not is_seen.any(axis=0).all():
         return None
     prior = run.prior
     for nuisance in nuisances_of(rig):
