@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 
 from airborne.io.environment import set_up_libraries
@@ -27,11 +28,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
+from airborne.cameras import Rig, read_rig, write_rig
 from airborne.evaluation import compare_joints, read_joint_paths
 from airborne.motion.run_folder import read_body_run
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from airborne.types import Image
+from airborne.video import VideoWriter
 
 START_SD_M = 0.015  # of each joint of a start that is not the recording's own, as those are set by hand
 
@@ -87,22 +90,23 @@ def read_images(path: Path) -> list[Image]:
 
 def write_video(path: Path, images: Sequence[Image], rate_hz: int) -> None:
     """Encode a video, at a quality at which its noise stays."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=rate_hz, options={"crf": "18", "preset": "veryfast"})
-        stream.height, stream.width = images[0].shape[:2]
-        stream.pix_fmt = "yuv420p"
+    height, width = images[0].shape[:2]
+    with VideoWriter(path, size=(width, height), rate=Fraction(rate_hz), preset="veryfast") as writer:
         for image in images:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")))
-        container.mux(stream.encode())
+            writer.write(image)
 
 
 def write_trial(folder: Path, source: Path, recording: Recording) -> None:
     """Write videos, calibration, trial and truth of an altered recording."""
     for name, images in recording.images.items():
         write_video(folder / f"{name}.mp4", images, recording.rate_hz)
-    calibration = (source / "Calib.toml").read_text()
-    (folder / "Calib.toml").write_text(
-        re.sub(r"(size|matrix) = (.*)", lambda m: _scale(m, recording.scale), calibration)
+    scale = recording.scale
+    rig = read_rig(source / "Calib.toml")
+    sizes = [tuple(round(scale * length) for length in camera.size) for camera in rig]
+    middle = ((1 / scale - 1) / 2,) * 2  # of the pixels that the first one is the mean of
+    write_rig(
+        folder / "Calib.toml",
+        Rig(tuple(c.resample(scale=(1 / scale,) * 2, offset=middle, size=s) for c, s in zip(rig, sizes, strict=True))),
     )
     truth = read_joint_paths(source / "truth_joints.csv")
     lines = ["time_s,joint,x_m,y_m,z_m"]
@@ -122,15 +126,6 @@ def write_trial(folder: Path, source: Path, recording: Recording) -> None:
         joints = {name: rng.normal(known[name], START_SD_M).round(3).tolist() for name in names if name in known}
         text = head + "[start.joints_m]\n" + "".join(f"{name} = {at}\n" for name, at in joints.items())
     (folder / "trial.toml").write_text(text)
-
-
-def _scale(match: re.Match[str], scale: float) -> str:
-    values = [float(value) for value in re.findall(r"-?\d+\.?\d*", match[2])]
-    if match[1] == "size":
-        return f"size = {[scale * value for value in values]}"
-    fx, _, cx, _, fy, cy = values[:6]
-    cx, cy = (scale * (each + 0.5) - 0.5 for each in (cx, cy))
-    return f"matrix = {[[scale * fx, 0.0, cx], [0.0, scale * fy, cy], [0.0, 0.0, 1.0]]}"
 
 
 def rows_of(data: str, method: str, folder: Path) -> list[dict]:
