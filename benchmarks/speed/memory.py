@@ -54,8 +54,8 @@ class Still:
             self.resident_mb.append((frames.index, resident_mb()))
         return state, tuple(
             PlayerEstimate(
-                player=name, index=frames.index, time_s=frames.time_s, status=Status.TRACKED, points=np.array(POINTS),
-                covariance=np.tile(np.eye(3) * 1e-4, (6, 1, 1)), score=0.0, n_views=len(NAMES),
+                player=name, index=frames.index, time_s=frames.time_s, joint_status=(Status.TRACKED,) * 6,
+                points=np.array(POINTS), covariance=np.tile(np.eye(3) * 1e-4, (6, 1, 1)), score=0.0, n_views=len(NAMES),
             )
             for name in ("first", "second")
         )  # fmt: skip

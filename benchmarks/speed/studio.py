@@ -303,15 +303,14 @@ def write_team(run: Path, like: Path) -> None:
     leg = np.array([[0.0, 0, 1.0], [0, 0, 0.5], [0, 0, 0.1], [0.2, 0, 0]])
     home = np.random.default_rng(0).uniform([-2, -2, 0], [2, 2, 0.1], (20, 1, 3)) + np.repeat(leg, 2, axis=0)
     facts = {"covariance": np.broadcast_to(1e-4 * np.eye(3), (8, 3, 3)), "score": 1.0, "n_views": 3}
+    facts |= {"joint_status": (Status.TRACKED,) * len(joints)}
     with PlayersWriter(run / "joints.csv", joints) as writer:
         for k in range(N_TEAM_FRAMES):
             points = home + np.array([0.3 * np.sin(0.05 * k), 0, 0])
             time_s = Fraction(k, RATE)
             writer.append(
                 [
-                    PlayerEstimate(
-                        index=k, time_s=time_s, player=f"player{n}", points=each, status=Status.TRACKED, **facts
-                    )
+                    PlayerEstimate(index=k, time_s=time_s, player=f"player{n}", points=each, **facts)
                     for n, each in enumerate(points)
                 ]
             )

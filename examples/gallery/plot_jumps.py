@@ -33,7 +33,7 @@ motion = PlayersMotion(
     joints=JOINTS,
     points=(true_points + rng.normal(0, NOISE_M, true_points.shape))[:, None],
     covariance=np.tile(NOISE_M**2 * np.eye(3), (n, 1, len(JOINTS), 1, 1)),
-    status=np.full((n, 1), "tracked"),
+    joint_status=np.full((n, 1, len(JOINTS)), "tracked"),
     score=np.zeros((n, 1)),
     n_views=np.full((n, 1), 3),
 )

@@ -138,8 +138,9 @@ def test_text_holds_no_nan_and_names_what_has_no_partner():
     assert "nan" not in text.lower()
     assert "not compared: tail" in text
     hips = replace(STILL, joints=LEG_POINTS[:2], points=STILL.points[:2, :, :2] + 1.0, time_s=STILL.time_s[:2])
-    hips = replace(hips, **{name: getattr(STILL, name)[:2] for name in ("index", "status", "score", "n_views")})
-    text = compare_players(replace(hips, covariance=STILL.covariance[:2, :, :2]), STILL).describe()
+    hips = replace(hips, **{name: getattr(STILL, name)[:2] for name in ("index", "score", "n_views")})
+    hips = replace(hips, covariance=STILL.covariance[:2, :, :2], joint_status=STILL.joint_status[:2, :, :2])
+    text = compare_players(hips, STILL).describe()
     assert "nan" not in text.lower()
     assert "times; not recovered" in text
 
@@ -181,7 +182,7 @@ def estimate_at(motion, row):
         player="one",
         index=int(motion.index[row]),
         time_s=Fraction(row, 60),
-        status=Status.TRACKED,
+        joint_status=(Status.TRACKED,) * len(motion.joints),
         points=motion.points[row, 0],
         covariance=motion.covariance[row, 0],
         score=0.0,

@@ -94,7 +94,7 @@ def players_motion(time_s, points, *, sd_m=1e-3, joints=LEG_POINTS, players=("on
         joints=tuple(joints),
         points=points,
         covariance=np.broadcast_to(sd_m**2 * np.eye(3), (n, p, j, 3, 3)),
-        status=np.full((n, p), "tracked"),
+        joint_status=np.full((n, p, j), "tracked"),
         score=np.zeros((n, p)),
         n_views=np.full((n, p), 3),
     )

@@ -103,7 +103,8 @@ class StandIn:
                 player=name,
                 index=frames.index,
                 time_s=frames.time_s,
-                status=Status.UNCERTAIN if name != "Anna" and frames.index % 4 == 3 else Status.TRACKED,
+                joint_status=(Status.UNCERTAIN if name != "Anna" and frames.index % 4 == 3 else Status.TRACKED,)
+                * len(LEG_POINTS),
                 points=points_of(x, lifted[name]),
                 covariance=np.tile(np.diag([1e-4, 4e-4, 4e-4]), (6, 1, 1)),
                 score=-float(frames.index),

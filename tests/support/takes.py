@@ -95,7 +95,7 @@ def jumping(n=10, players=("Anna", "number 7"), *, lost=(), joints=(*LEGS, "tors
         joints=tuple(joints),
         points=points[:, :, at],
         covariance=np.where(is_lost[..., None, None, None], np.nan, np.broadcast_to(1e-4 * np.eye(3), (len(at), 3, 3))),
-        status=np.where(is_lost, "lost", "tracked"),
+        joint_status=np.where(is_lost[..., None].repeat(len(at), axis=-1), "lost", "tracked"),
         score=np.zeros((n, len(players))),
         n_views=np.full((n, len(players)), 3),
     )

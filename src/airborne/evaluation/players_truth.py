@@ -62,7 +62,7 @@ def read_players_truth(path: Path) -> PlayersMotion:
         joints=tuple(_joint(stem) for stem in stems),
         points=points,
         covariance=np.broadcast_to(_TRUTH_SD_M**2 * np.eye(3), (*points.shape, 3)),
-        status=np.full(shape, Status.TRACKED.value),
+        joint_status=np.full(points.shape[:3], Status.TRACKED.value),
         score=np.full(shape, np.nan),
         n_views=np.zeros(shape, np.int64),
     )

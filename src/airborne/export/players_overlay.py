@@ -18,6 +18,7 @@ from airborne.export.lettering import draw_text
 from airborne.export.overlays import CameraVideos, OverlaysAs, draw_label, line_px, time_label, view_image
 from airborne.export.palette import STATUS_RGB
 from airborne.tracking import Status
+from airborne.tracking.estimate import worst_status
 from airborne.tracking.players import PlayerEstimate, PlayerStart
 from airborne.types import Array, Image
 from airborne.video import Frames
@@ -53,21 +54,24 @@ class PlayersOverlayVideos:
 
     def write(self, frames: Frames, joints: Sequence[str], estimates: Sequence[PlayerEstimate]) -> None:
         """Append what every camera saw at one time, with every player drawn who is not lost."""
-        located = {e.player: (_leg_points(joints, e), e.status) for e in estimates if e.status is not Status.LOST}
+        at = [joints.index(name) for name in LEG_POINTS]
+        located = {e.player: (e.points[at], e.status) for e in estimates if e.status is not Status.LOST}
         heights = self._heights.update(located)
         jumpers = [
             Jumper(player, points, heights[player], is_sure=status is Status.TRACKED)
             for player, (points, status) in located.items()
         ]
-        status = _worst_status(estimates)
+        status = worst_status(estimate.status for estimate in estimates)
         images = []
         for view, camera in zip(frames.views, self._videos.cameras, strict=True):
             image = view_image(view, camera)
             if self._style == "broadcast":
                 draw_heights(image, camera, jumpers if view is not None else [])
             else:
-                for player, (points, of_player) in located.items() if view is not None else ():
-                    _draw_rods(image, camera, player, points=points, status=of_player)
+                for estimate in estimates if view is not None else ():
+                    if estimate.player in located:
+                        own = [estimate.joint_status[k] for k in at]
+                        _draw_rods(image, camera, estimate.player, points=estimate.points[at], statuses=own)
                 draw_label(image, time_label(frames, status), STATUS_RGB[status])
             images.append(image)
         self._videos.write(frames.index, images)
@@ -98,25 +102,22 @@ def rectangle_px(camera: Camera, upper: Array, lower: Array, width_m: float) -> 
     return np.stack([ends[0] - half, ends[0] + half, ends[1] + half, ends[1] - half])
 
 
-def _draw_rods(image: Image, camera: Camera, player: str, *, points: Array, status: Status) -> None:
-    rgb = GREEN_RGB if status is Status.TRACKED else STATUS_RGB[status]
-    corners = [
-        rectangle_px(camera, points[a], points[b], width_m) for (a, b), width_m in zip(RODS, _ROD_WIDTHS_M, strict=True)
-    ]
-    polygons = [np.rint(each * (1 << _BITS)).astype(np.int32) for each in corners if each is not None]
-    cv2.polylines(image, polygons, True, rgb, max(line_px(image) // 2, 1), cv2.LINE_AA, _BITS)
-    if polygons:
-        highest = np.concatenate([each for each in corners if each is not None])
+def _draw_rods(image: Image, camera: Camera, player: str, *, points: Array, statuses: Sequence[Status]) -> None:
+    """Draw a player's legs, LEG_POINTS (6, 3) [m], each rod in the colour of the less trusted of its ends."""
+    drawn = []
+    for (a, b), width_m in zip(RODS, _ROD_WIDTHS_M, strict=True):
+        corners = rectangle_px(camera, points[a], points[b], width_m)
+        if corners is not None:
+            rgb = _rgb(worst_status([statuses[a], statuses[b]]))
+            polygon = np.rint(corners * (1 << _BITS)).astype(np.int32)
+            cv2.polylines(image, [polygon], True, rgb, max(line_px(image) // 2, 1), cv2.LINE_AA, _BITS)
+            drawn.append(corners)
+    if drawn:
+        highest = np.concatenate(drawn)
         x, y = highest[np.argmin(highest[:, 1])]
         size_px = image.shape[0] * _NAME_SHARE
-        draw_text(image, player, (x, y - size_px / 2), size_px=size_px, rgb=rgb)
+        draw_text(image, player, (x, y - size_px / 2), size_px=size_px, rgb=_rgb(worst_status(statuses)))
 
 
-def _leg_points(joints: Sequence[str], estimate: PlayerEstimate) -> Array:
-    """Return a player's points (6, 3), in the order of LEG_POINTS."""
-    return estimate.points[[joints.index(name) for name in LEG_POINTS]]
-
-
-def _worst_status(estimates: Sequence[PlayerEstimate]) -> Status:
-    statuses = {estimate.status for estimate in estimates}
-    return next(status for status in (Status.LOST, Status.UNCERTAIN, Status.TRACKED) if status in statuses)
+def _rgb(status: Status) -> tuple[int, int, int]:
+    return GREEN_RGB if status is Status.TRACKED else STATUS_RGB[status]

@@ -79,6 +79,7 @@ def label_players(motion: PlayersMotion) -> xr.Dataset:
         "position_sd": ((*per_player, "joint"), motion.sd, _SD),
         "covariance": ((*per_player, "joint", "space", "space_2"), motion.covariance, {"units": "m2"}),
         "status": (per_player, motion.status),
+        "joint_status": ((*per_player, "joint"), motion.joint_status),
     }
     coordinates = {
         "time": ("time", motion.time_s, {"units": "s"}),

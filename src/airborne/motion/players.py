@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.body.legs import LEG_POINTS
 from airborne.errors import ResultError
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.io.writing import explain_full_disk
@@ -44,7 +45,7 @@ class PlayersMotion:
     joints: tuple[str, ...]
     points: Array  # (n, players, joints, 3) [m], world
     covariance: Array  # (n, players, joints, 3, 3) [m²], of each joint on its own
-    status: NDArray[np.str_]  # (n, players) values of `Status`
+    joint_status: NDArray[np.str_]  # (n, players, joints) values of `Status`
     score: Array  # (n, players) mean log-likelihood [nat]
     n_views: NDArray[np.int64]  # (n, players)
 
@@ -69,13 +70,23 @@ class PlayersMotion:
             covariance=np.array([[e.covariance for e in step] for step in steps], float).reshape(
                 *shape, len(joints), 3, 3
             ),
-            status=np.array([[e.status.value for e in step] for step in steps], np.str_).reshape(shape),
+            joint_status=np.array([[e.joint_status for e in step] for step in steps], np.str_).reshape(
+                *shape, len(joints)
+            ),
             score=np.array([[e.score for e in step] for step in steps], float).reshape(shape),
             n_views=np.array([[e.n_views for e in step] for step in steps], np.int64).reshape(shape),
         )
 
     def __len__(self) -> int:
         return len(self.index)
+
+    @property
+    def status(self) -> NDArray[np.str_]:
+        """Each player's status, the worst of hips, knees and ankles, or of all joints without these: (n, players)."""
+        legs = [k for k, name in enumerate(self.joints) if name in LEG_POINTS] or list(range(len(self.joints)))
+        statuses = np.array([status.value for status in Status])
+        ranks = (self.joint_status[..., legs, None] == statuses).argmax(axis=-1)
+        return statuses[ranks.max(axis=-1)]
 
     @property
     def sd(self) -> Array:
@@ -162,7 +173,6 @@ def read_players(path: Path) -> PlayersMotion:
     covariance = np.empty((n, len(players), n_joints, 3, 3))
     for name, i, j in zip(_COVARIANCE, *_UPPER, strict=True):
         covariance[..., i, j] = covariance[..., j, i] = numbers[name]
-    status = np.array(table["status"].iloc[::n_joints], np.str_)
     time_s = numbers["time_s"][:, 0, 0]
     return PlayersMotion(
         index=numbers["frame"][:, 0, 0],
@@ -172,7 +182,7 @@ def read_players(path: Path) -> PlayersMotion:
         joints=tuple(joints[:n_joints].tolist()),
         points=np.stack([numbers[name] for name in _POSITION], axis=-1),
         covariance=covariance,
-        status=status.reshape(n, len(players)),
+        joint_status=np.array(table["status"], np.str_).reshape(n, len(players), n_joints),
         score=numbers["score"][..., 0],
         n_views=numbers["n_views"][..., 0],
     )
@@ -199,10 +209,11 @@ def _lines(motion: PlayersMotion) -> list[str]:
     upper = motion.covariance[0][..., *_UPPER]
     numbers = np.concatenate([motion.points[0], motion.sd[0, ..., None], upper], axis=-1).tolist()
     for p, player in enumerate(motion.players):
-        shared = [player, str(motion.index[0]), cell(float(motion.time_s[0])), str(motion.status[0, p])]
+        shared = [player, str(motion.index[0]), cell(float(motion.time_s[0]))]
         ends = [cell(float(motion.score[0, p])), str(motion.n_views[0, p])]
         for j, joint in enumerate(motion.joints):
-            lines.append(",".join([*shared, joint, *map(cell, numbers[p][j]), *ends]) + "\n")
+            own = [str(motion.joint_status[0, p, j]), joint, *map(cell, numbers[p][j])]
+            lines.append(",".join([*shared, *own, *ends]) + "\n")
     return lines
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
@@ -19,6 +20,11 @@ class Status(StrEnum):
     TRACKED = "tracked"
     UNCERTAIN = "uncertain"
     LOST = "lost"  # no estimate: the pose is None
+
+
+def worst_status(statuses: Iterable[Status]) -> Status:
+    """Return the one that can be trusted least."""
+    return max(statuses, key=list(Status).index)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

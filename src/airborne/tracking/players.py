@@ -8,7 +8,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from airborne.tracking.estimate import Status
+from airborne.body.legs import LEG_POINTS
+from airborne.tracking.estimate import Status, worst_status
 from airborne.types import Array
 from airborne.video import Frames
 
@@ -33,12 +34,17 @@ class PlayerEstimate:
     player: str
     index: int
     time_s: Fraction
-    status: Status
+    joint_status: tuple[Status, ...]  # of each joint
     points: Array  # (joints, 3) [m], world
     covariance: Array  # (joints, 3, 3) [m²], of each joint for itself
     score: float  # mean log-likelihood of the estimate [nat]; NaN when lost
     n_views: int  # cameras that were used and in which the player was not occluded
     note: str = ""  # what the user should know of this time, in one line
+
+    @property
+    def status(self) -> Status:
+        """The worst of hips, knees and ankles, which every tracker's joints begin with."""
+        return worst_status(self.joint_status[: len(LEG_POINTS)])
 
 
 def lost_player_estimate(player: str, frames: Frames, n_joints: int) -> PlayerEstimate:
@@ -47,7 +53,7 @@ def lost_player_estimate(player: str, frames: Frames, n_joints: int) -> PlayerEs
         player=player,
         index=frames.index,
         time_s=frames.time_s,
-        status=Status.LOST,
+        joint_status=(Status.LOST,) * n_joints,
         points=np.full((n_joints, 3), np.nan),
         covariance=np.full((n_joints, 3, 3), np.nan),
         score=np.nan,

@@ -202,9 +202,9 @@ def test_a_peak_that_one_camera_alone_saw_has_no_height():
     motion = motion_of(CLEAN)
     jump = only(motion)
     in_the_air = (motion.time_s > jump.takeoff_s.value) & (motion.time_s < jump.landing_s.value)
-    status, n_views = motion.status.astype("<U9"), motion.n_views.copy()
+    status, n_views = motion.joint_status.astype("<U9"), motion.n_views.copy()
     status[in_the_air], n_views[in_the_air] = "uncertain", 1
-    unseen = only(replace(motion, status=status, n_views=n_views))
+    unseen = only(replace(motion, joint_status=status, n_views=n_views))
     assert np.isfinite(jump.foot_height_m.value)
     assert np.isnan(unseen.foot_height_m.value) and np.isnan(unseen.hip_height_m.value)
 
@@ -295,10 +295,10 @@ def test_reach_is_the_higher_wrist_at_its_peak(clean):
 
 def test_uncertain_frames_of_the_flight_are_counted_and_those_of_the_floor_are_not():
     motion = motion_of(CLEAN)
-    status = motion.status.astype("U9")
+    status = motion.joint_status.astype("U9")
     at = round(60 * (CLEAN.takeoff_s + CLEAN.speed_m_s / G))
     status[at : at + 4] = status[0] = "uncertain"
-    jump = only(replace(motion, status=status))
+    jump = only(replace(motion, joint_status=status))
     assert (only(motion).n_uncertain, jump.n_uncertain) == (0, 4)
 
 

@@ -8,6 +8,7 @@ import pytest
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.dynamics import N_FREE, state_at_rest
+from airborne.tracking.capsules.track import Everybody
 from airborne.tracking.capsules.unseen_legs import find_unseen_legs, free_leg
 
 KICK = np.array([-2.2, 0.1, -0.3, 0.9, -0.1])  # of a leg that is swung up
@@ -22,7 +23,7 @@ def tracker(hall):
 @pytest.fixture(scope="module")
 def kicking(hall, tracker):
     """A track whose left leg is up and sure of it, while the player stands."""
-    [track] = tracker.step(tracker.init(), hall.frames(0))[0].values()
+    [track] = tracker.step(tracker.init(), hall.frames(0))[0].players.values()
     free = track.state[:N_FREE].copy()
     free[LEFT] = KICK
     state = np.concatenate([free, track.state[N_FREE:]])
@@ -30,14 +31,14 @@ def kicking(hall, tracker):
 
 
 def test_the_leg_is_looked_for_where_the_other_is(hall, tracker, kicking):
-    _, [estimate] = tracker.step({"anna": kicking}, hall.frames(1))
+    _, [estimate] = tracker.step(Everybody({"anna": kicking}, ()), hall.frames(1))
     assert estimate.status is Status.TRACKED
     assert np.linalg.norm(estimate.points - hall.truth("anna", 1), axis=1).max() < 0.06
 
 
 def test_a_leg_that_no_pixels_show_is_not_tracked(hall, tracker, kicking, monkeypatch):
     monkeypatch.setattr("airborne.tracking.capsules.tracker.free_leg", lambda expected, state, leg: expected)
-    _, [estimate] = tracker.step({"anna": kicking}, hall.frames(1))
+    _, [estimate] = tracker.step(Everybody({"anna": kicking}, ()), hall.frames(1))
     assert np.linalg.norm(estimate.points[4] - hall.truth("anna", 1)[4]) > 0.3
     assert estimate.status is Status.UNCERTAIN
 

@@ -117,7 +117,7 @@ def true_motion(scene: BlockScene) -> PlayersMotion:
         joints=_TRUE_JOINTS,
         points=points,
         covariance=np.broadcast_to(1e-6 * np.eye(3), (*points.shape, 3)),
-        status=np.full(shape, Status.TRACKED.value),
+        joint_status=np.full(points.shape[:3], Status.TRACKED.value),
         score=np.full(shape, np.nan),
         n_views=np.zeros(shape, np.int64),
     )

@@ -19,7 +19,7 @@ from airborne.tracking.capsules.views import MapScale, RegionMaps, map_evidence,
 from airborne.types import Array
 from airborne.video import Frames
 
-_STATURE_PER_LEG = 1 / 0.491  # thigh and shank are this share of the stature: 0.245 and 0.246 (Drillis and Contini)
+STATURE_PER_LEG = 1 / 0.491  # thigh and shank are this share of the stature: 0.245 and 0.246 (Drillis and Contini)
 # of a stature of 1 m: waist, (shorts, socks: shares), trunk, pelvis, thigh, shank, foot, sole
 _LENGTHS = np.array([0.094, 0.5, 0.35, 0.24, 0.065, 0.245, 0.246, 0.075, 0.035])
 _RADII = np.array([0.054, 0.051, 0.048, 0.031, 0.0226, 0.0242, 0.043, 0.027])  # the same of the radii
@@ -63,7 +63,7 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
     if missing:
         raise TrialError(f"player '{name}' has no {', '.join(missing)} in [start]; give torso, hips, knees and ankles")
     legs = Legs.from_points(joints_m["torso"], np.array([joints_m[joint] for joint in LEG_POINTS]))
-    stature_m = (legs.thigh_m + legs.shank_m) * _STATURE_PER_LEG
+    stature_m = (legs.thigh_m + legs.shank_m) * STATURE_PER_LEG
     state = np.concatenate([np.zeros(N_DOF), average_shape(stature_m)])
     lengths = state[N_DOF : N_DOF + N_LENGTHS]
     lengths[[PELVIS, THIGH, SHANK]] = legs.half_pelvis_m, legs.thigh_m, legs.shank_m

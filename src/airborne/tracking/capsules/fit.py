@@ -56,6 +56,7 @@ class JumperFit:
     nats: float  # weighted evidence
     total: float  # nats with the prior
     owned: Array  # (v, 10, 2, 2) evidence and area [px of the maps] of each capsule's two classes
+    cameras: Array  # (v, 4, 4) of the regions, see `RegionMaps`
 
 
 class _Priors(NamedTuple):
@@ -102,6 +103,7 @@ def fit_jumper(
         nats=float(best.totals[0]),
         total=float(best.totals[1]),
         owned=best.owned[:, :N_CAPSULES],
+        cameras=region_maps.cameras,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
@@ -46,6 +47,13 @@ class Track:
     searched_s: Fraction | None = None  # of the last look for a lost player
     bystanders: tuple[Bystander, ...] | None = None  # known since a look for a lost player
     is_unclear: bool = False  # that look left open who is meant, which was said
+
+
+class Everybody(NamedTuple):
+    """Who is followed: the players, by name, and others who may hide them."""
+
+    players: Mapping[str, Track]
+    bystanders: tuple[Track, ...]
 
 
 def evidence_per_px(owned: Array) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import expit
 
 from airborne.errors import TrialError
+from airborne.tracking.capsules.bystanders import occluding_capsules
 from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of
 from airborne.tracking.capsules.floor_search import (
     Stander,
@@ -21,7 +22,6 @@ from airborne.tracking.capsules.floor_search import (
 from airborne.tracking.capsules.jumper import JOINTS, N_DOF, SHANK, THIGH
 from airborne.tracking.capsules.standing import ColourViews
 from airborne.tracking.capsules.track import evidence_per_px
-from airborne.tracking.capsules.tracker import occluding_capsules
 from airborne.tracking.first_pose.candidates import LEAST_PROBABILITY
 from airborne.tracking.players import PlayerStart
 from airborne.types import Array

@@ -171,7 +171,7 @@ def _estimate(name: str, frames: Frames, legs: LegsEstimate, observation: LegsOb
         player=name,
         index=frames.index,
         time_s=frames.time_s,
-        status=Status.TRACKED if is_certain else Status.UNCERTAIN,
+        joint_status=(Status.TRACKED if is_certain else Status.UNCERTAIN,) * len(LEG_POINTS),
         points=legs.points,
         covariance=legs.covariance,
         score=score,

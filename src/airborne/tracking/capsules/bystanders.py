@@ -1,0 +1,73 @@
+"""Who else stands between the players and the cameras: others are found and followed because they hide legs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, pose_state
+from airborne.tracking.capsules.first_frame import STATURE_PER_LEG, FirstFrameFit, fit_first_frame, points_of
+from airborne.tracking.capsules.floor_search import find_standers
+from airborne.tracking.capsules.jumper import JOINTS, N_DOF, SHANK, THIGH
+from airborne.tracking.capsules.kernel_arguments import Capsules
+from airborne.tracking.capsules.standing import ColourViews
+from airborne.tracking.capsules.track import evidence_per_px
+from airborne.types import Array
+from airborne.video import Frames
+from airborne.video.small import shrink
+
+# chosen by hand on synthetic blocks; without others the joints err by the same 18.8 mm: blocker_variants.csv
+_NEAR_M = 3.0  # others further away do not occlude
+_FARTHEST_M, _MARGIN_M = 4.0, 1.0  # from a player toward each camera, and around: where others are looked for
+_LEAST_SUPPORT = 1.1  # [nat m2] of somebody, as `recovery` has it
+_LEAST_EVIDENCE = 1.2  # [nat a pixel] of somebody's fit, as `tracking.first_pose.players` has it
+_LOOSER = 3.0  # than joints set by hand, likewise
+_HEAD_TOP, _HEAD_RADIUS = 0.136, 0.05  # over the chest, and of the head: shares of the stature (Drillis and Contini)
+_N_OCCLUDING = N_CAPSULES + 1  # capsules of one person, with the head
+
+
+def find_bystanders(players: Sequence[Array], frames: Frames) -> list[FirstFrameFit]:
+    """Find and fit who stands between players, states (35,) each, and the cameras."""
+    views = [shrink(view) for view in frames.views if view is not None]
+    if len(views) < 2:
+        return []
+    zone = _between(np.array([state[:2] for state in players]), np.array([view.camera.centre[:2] for view in views]))
+    colours = ColourViews.of(views, zone)
+    for state in players:
+        colours = colours.without(state)
+    standers = find_standers(colours, zone, np.full((2, 2), np.nan))
+    states = [stander.states[0] for stander in standers if stander.support[0] > _LEAST_SUPPORT]
+    found = []
+    for i, state in enumerate(states):
+        joints_m: dict[str, Array] = dict(zip(JOINTS, points_of(state), strict=True))
+        occluders = occluding_capsules(state, [*players, *states[:i], *states[i + 1 :]])
+        fitted = fit_first_frame(f"bystander {i}", joints_m, frames, occluders, looser=_LOOSER)
+        if evidence_per_px(fitted.fit.owned) > _LEAST_EVIDENCE:
+            found.append(fitted)
+    return found
+
+
+def occluding_capsules(state: Array, others: Sequence[Array]) -> Capsules:
+    """Return what may occlude a jumper: the capsules of others nearby, and their heads.
+
+    state (35,) is the jumper's, others (35,) each.
+    """
+    others = [other for other in others if np.linalg.norm(other[:3] - state[:3]) < _NEAR_M]
+    ends, end_radii = np.empty((len(others), _N_OCCLUDING, 2, 3)), np.empty((len(others), _N_OCCLUDING, 2))
+    for other, each_ends, each_radii in zip(others, ends, end_radii, strict=True):
+        pose_state(other, np.empty((N_POINTS, 3)), each_ends, each_radii, np.empty(N_CAPSULES))
+        stature_m = STATURE_PER_LEG * (other[N_DOF + THIGH] + other[N_DOF + SHANK])
+        waist, chest = each_ends[:2].mean(axis=0)
+        up = (chest - waist) / np.linalg.norm(chest - waist)
+        each_ends[-1] = chest, chest + (_HEAD_TOP - _HEAD_RADIUS) * stature_m * up
+        each_radii[-1] = _HEAD_RADIUS * stature_m
+    return Capsules(ends.reshape(-1, 2, 3), end_radii.reshape(-1, 2))
+
+
+def _between(places: Array, cameras: Array) -> Array:
+    """Return the zone (2, 2), from and to x, y [m], between places (n, 2) and cameras (v, 2) on the floor."""
+    toward = cameras[:, None] - places
+    reach = np.minimum(1.0, _FARTHEST_M / np.linalg.norm(toward, axis=2, keepdims=True))
+    points = np.vstack([places, (places + reach * toward).reshape(-1, 2)])
+    return np.array([points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M])
