@@ -21,7 +21,7 @@ from rows import append
 
 from airborne.body.legs import LEG_POINTS
 from airborne.synthetic import block_frames, block_scene, noisy_starts, true_joints
-from airborne.tracking.capsules import Blocker, dynamics, fit, surface_colours, tracker
+from airborne.tracking.capsules import Blocker, bystanders, dynamics, fit, occlusion, surface_colours, tracker
 from airborne.tracking.players import PlayerStart
 
 SEEDS, WITH_TWO = (31, 32, 33, 34), (34,)
@@ -32,11 +32,11 @@ VARIANTS: dict[str, list[Switch]] = {
     "without habits": [(fit, "_POSTURE_INFORMATION", np.zeros_like(fit._POSTURE_INFORMATION))],
     "without standing feet": [(tracker, "_CONTACT_M", -1.0)],
     "without flight": [(tracker, "_AIRBORNE_M", np.inf)],
-    "without hidden views": [(tracker, "_OCCLUSION_RATE", 0.0)],
+    "without hidden views": [(occlusion, "_OCCLUSION_RATE", 0.0)],
     "clothes that stay": [(dynamics, "_SLIDING_SD", dynamics._SLIDING_SD * 0.01)],
     "colours as lit at first": [(surface_colours, "_LIGHTS", np.ones_like(surface_colours._LIGHTS))],
     "socks and shoes as at first": [(tracker, "COLOUR_UPDATE_S", np.inf)],
-    "without other players": [(tracker, "_NEAR_M", 0.0)],
+    "without other players": [(bystanders, "_NEAR_M", 0.0)],
 }
 
 
