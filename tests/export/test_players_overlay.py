@@ -86,7 +86,9 @@ def test_the_papers_rectangles_lie_round_the_legs_in_green(tmp_path):
 def test_uncertain_players_are_amber_and_lost_ones_are_omitted(tmp_path):
     amber = last_picture(tmp_path / "a", [(frames(), player_estimate(joint_status=6 * (Status.UNCERTAIN,)))], "paper")
     lost = last_picture(
-        tmp_path / "b", [(frames(), player_estimate(joint_status=6 * (Status.LOST,), points=np.full((6, 3), np.nan)))], "paper"
+        tmp_path / "b",
+        [(frames(), player_estimate(joint_status=6 * (Status.LOST,), points=np.full((6, 3), np.nan)))],
+        "paper",
     )
     half = 320
     for picture, shows_amber in ((amber, True), (lost, False)):

@@ -254,7 +254,9 @@ def test_a_run_in_which_everybody_is_lost_says_so_and_exits_with_one(path, tmp_p
         def step(self, state, frames):
             state, estimates = super().step(state, frames)
             nothing = {"points": np.full((6, 3), np.nan), "covariance": np.full((6, 3, 3), np.nan), "score": np.nan}
-            return state, tuple(replace(each, joint_status=6 * (Status.LOST,), n_views=0, **nothing) for each in estimates)
+            return state, tuple(
+                replace(each, joint_status=6 * (Status.LOST,), n_views=0, **nothing) for each in estimates
+            )
 
     monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Lost())
     assert in_process("track", path, "-o", tmp_path / "run") == 1

@@ -113,7 +113,9 @@ def _has_legs(motion: PlayersMotion) -> bool:
 
 def _select_players(motion: PlayersMotion, players: Sequence[str]) -> PlayersMotion:
     at = [motion.players.index(name) for name in players]
-    columns = {name: getattr(motion, name)[:, at] for name in ("points", "covariance", "joint_status", "score", "n_views")}
+    columns = {
+        name: getattr(motion, name)[:, at] for name in ("points", "covariance", "joint_status", "score", "n_views")
+    }
     return replace(motion, players=tuple(players), **columns)
 
 

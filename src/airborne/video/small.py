@@ -9,13 +9,13 @@ import numpy as np
 
 from airborne.video.frames import View
 
-_WIDTH_PX = 640  # about the width of the small pictures
+_WIDTH_PX = 640  # about the usual width of small pictures
 
 
-def shrink(view: View) -> View:
-    """Return a view about 640 columns wide, averages of areas that are about square."""
+def shrink(view: View, width_px: int = _WIDTH_PX) -> View:
+    """Return a view about as many columns wide, averages of areas that are about square."""
     camera, rgb = view.camera, view.rgb
-    columns = max(1, round(camera.size[0] / _WIDTH_PX))
+    columns = max(1, round(camera.size[0] / width_px))
     rows = max(1, round(columns * camera.K[1, 1] / camera.K[0, 0]))
     if columns == rows == 1:
         return replace(view, image=rgb)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 
 import numpy as np
 
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, pose_state
 from airborne.tracking.capsules.first_frame import STATURE_PER_LEG, FirstFrameFit, fit_first_frame, points_of
-from airborne.tracking.capsules.floor_search import find_standers
+from airborne.tracking.capsules.floor_search import find_standers, floor_grid
 from airborne.tracking.capsules.jumper import JOINTS, N_DOF, SHANK, THIGH
 from airborne.tracking.capsules.kernel_arguments import Capsules
 from airborne.tracking.capsules.standing import ColourViews
@@ -18,8 +19,10 @@ from airborne.video import Frames
 from airborne.video.small import shrink
 
 # chosen by hand on synthetic blocks; without others the joints err by the same 18.8 mm: blocker_variants.csv
+FOLLOWED_EVERY_S = Fraction(1, 20)  # others; between, they are predicted
 _NEAR_M = 3.0  # others further away do not occlude
-_FARTHEST_M, _MARGIN_M = 4.0, 1.0  # from a player toward each camera, and around: where others are looked for
+_FARTHEST_M, _MARGIN_M = 4.0, 1.0  # from a player toward each camera, and beside that way: where others are looked for
+_WIDTH_PX = 320  # of the pictures in which others are looked for
 _LEAST_SUPPORT = 1.1  # [nat m2] of somebody, as `recovery` has it
 _LEAST_EVIDENCE = 1.2  # [nat a pixel] of somebody's fit, as `tracking.first_pose.players` has it
 _LOOSER = 3.0  # than joints set by hand, likewise
@@ -29,14 +32,16 @@ _N_OCCLUDING = N_CAPSULES + 1  # capsules of one person, with the head
 
 def find_bystanders(players: Sequence[Array], frames: Frames) -> list[FirstFrameFit]:
     """Find and fit who stands between players, states (35,) each, and the cameras."""
-    views = [shrink(view) for view in frames.views if view is not None]
+    views = [shrink(view, _WIDTH_PX) for view in frames.views if view is not None]
     if len(views) < 2:
         return []
-    zone = _between(np.array([state[:2] for state in players]), np.array([view.camera.centre[:2] for view in views]))
+    zone, places = _between(
+        np.array([state[:2] for state in players]), np.array([view.camera.centre[:2] for view in views])
+    )
     colours = ColourViews.of(views, zone)
     for state in players:
         colours = colours.without(state)
-    standers = find_standers(colours, zone, np.full((2, 2), np.nan))
+    standers = find_standers(colours, places, np.full((2, 2), np.nan))
     states = [stander.states[0] for stander in standers if stander.support[0] > _LEAST_SUPPORT]
     found = []
     for i, state in enumerate(states):
@@ -65,9 +70,15 @@ def occluding_capsules(state: Array, others: Sequence[Array]) -> Capsules:
     return Capsules(ends.reshape(-1, 2, 3), end_radii.reshape(-1, 2))
 
 
-def _between(places: Array, cameras: Array) -> Array:
-    """Return the zone (2, 2), from and to x, y [m], between places (n, 2) and cameras (v, 2) on the floor."""
-    toward = cameras[:, None] - places
-    reach = np.minimum(1.0, _FARTHEST_M / np.linalg.norm(toward, axis=2, keepdims=True))
-    points = np.vstack([places, (places + reach * toward).reshape(-1, 2)])
-    return np.array([points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M])
+def _between(players: Array, cameras: Array) -> tuple[Array, Array]:
+    """Return the zone (2, 2), from and to x, y [m], and places in it (n, 2), between players (k, 2) and cameras (v, 2)."""
+    toward = (cameras[:, None] - players).reshape(-1, 2)
+    length_m = np.linalg.norm(toward, axis=1)
+    toward *= (np.minimum(1.0, _FARTHEST_M / length_m))[:, None]
+    origins = np.tile(players, (len(cameras), 1))
+    points = np.vstack([players, origins + toward])
+    zone = np.array([points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M])
+    off = floor_grid(zone)[:, None] - origins
+    along = np.clip((off * toward).sum(axis=2) / (toward**2).sum(axis=1), 0.0, 1.0)
+    off_line_m = np.linalg.norm(off - along[..., None] * toward, axis=2).min(axis=1)
+    return zone, floor_grid(zone)[off_line_m < _MARGIN_M]

@@ -46,24 +46,29 @@ class Stander:
         return self.states[0, :2]
 
 
-def evaluate_grid(views: ColourViews, zone: Array) -> tuple[Array, Array]:
-    """Return stances (n, 18) on a grid of a zone (2, 2) of the floor, and what each tells (n,) [nat m2]."""
+def floor_grid(zone: Array) -> Array:
+    """Return places on a grid of a zone (2, 2) of the floor: (n, 2) [m]."""
     x, y = (np.arange(low, high + _GRID_M / 2, _GRID_M) for low, high in zone.T)
+    return np.array([(a, b) for a in x for b in y])
+
+
+def evaluate_grid(views: ColourViews, places: Array) -> tuple[Array, Array]:
+    """Return stances (n, 18) at places (n, 2) on the floor, and what each tells (n,) [nat m2]."""
     support, stances = [], []
     for knee in _KNEES:
-        stances.append(np.array([stance(a, b, _FACING, knee) for a in x for b in y]))
+        stances.append(np.array([stance(a, b, _FACING, knee) for a, b in places]))
         support.append(views.support(states_of(stances[-1])))
     best = np.argmax(support, axis=0)
     return np.stack(stances)[best, np.arange(len(best))], np.max(support, axis=0)
 
 
-def find_standers(views: ColourViews, zone: Array, wanted: Array) -> Iterator[Stander]:
-    """Yield players in a zone (2, 2) of the floor, from the one who tells most.
+def find_standers(views: ColourViews, places: Array, wanted: Array) -> Iterator[Stander]:
+    """Yield players about places (n, 2) on the floor, from the one who tells most.
 
     The pixels of each are explained and taken away before the next. Those outside the `wanted` zone are only looked at
     as facing the net.
     """
-    stances, support = evaluate_grid(views, zone)
+    stances, support = evaluate_grid(views, places)
     for _ in range(_MOST_PLAYERS):
         while True:
             best = int(support.argmax())

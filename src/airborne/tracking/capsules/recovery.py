@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 
 from airborne.tracking.capsules.dynamics import N_FREE, N_SLIDING
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, fit_jumper
-from airborne.tracking.capsules.floor_search import Stander, find_standers
+from airborne.tracking.capsules.floor_search import Stander, find_standers, floor_grid
 from airborne.tracking.capsules.jumper import N_DOF
 from airborne.tracking.capsules.kernel_arguments import NOBODY
 from airborne.tracking.capsules.standing import ColourViews
@@ -104,7 +104,7 @@ def _standers(frames: Frames, seen: Sequence[Array], zone: Array) -> list[Stande
     colours = ColourViews.of(views, zone)
     for state in seen:
         colours = colours.without(state)
-    return [each for each in find_standers(colours, zone, zone) if each.support[0] > _LEAST_SUPPORT]
+    return [each for each in find_standers(colours, floor_grid(zone), zone) if each.support[0] > _LEAST_SUPPORT]
 
 
 def _bystanders(lost: Mapping[str, Track], zone: Array) -> tuple[Bystander, ...]:

@@ -87,17 +87,35 @@ def learn_colours(
     of its pixels. A colour that a class shares with the background, or with the class above or below it on the body,
     goes to the one that has more of it.
     """
-    counts = np.zeros((len(SURFACE_CLASSES), BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
-    background = np.zeros((n_cameras, BINS_PER_CHANNEL, BINS_PER_CHANNEL, BINS_PER_CHANNEL), np.float32)
-    for region, (core, _, around) in zip(regions, images, strict=True):
-        count_colours(region.rgb, around < 0, 1, background[region.view])
-        for i in range(len(SURFACE_CLASSES)):
-            if used[region.view, i]:
-                count_colours(region.rgb, core == i, 1, counts[i])
-    background /= np.maximum(background.sum(axis=(1, 2, 3), keepdims=True), 1)
-    raw = _normalise(_augment_brightness(counts).reshape(len(SURFACE_CLASSES), -1))
-    around_all = background.sum(axis=0).ravel() / max(len(regions), 1)
-    distributions = _separate_classes(raw, around_all).reshape(counts.shape).astype(np.float32)
+    return _learn(_count(regions, images), [region.view for region in regions], n_cameras, used)
+
+
+class _Counts(NamedTuple):
+    """How often regions show each colour."""
+
+    classes: Array  # (regions, 5, 32768) on each class, brighter and darker too
+    background: NDArray[np.float32]  # (regions, 32, 32, 32) around the player
+
+
+def _count(regions: Sequence[PlayerRegion], images: Sequence[ClassImages]) -> _Counts:
+    n, k, bins = len(regions), len(SURFACE_CLASSES), (BINS_PER_CHANNEL,) * 3
+    counts, background = np.zeros((n, k, *bins), np.float32), np.zeros((n, *bins), np.float32)
+    for region, (core, _, around), of_class, of_background in zip(regions, images, counts, background, strict=True):
+        count_colours(region.rgb, around < 0, 1, of_background)
+        for i, count in enumerate(of_class):
+            count_colours(region.rgb, core == i, 1, count)
+    return _Counts(_augment_brightness(counts.reshape(n * k, *bins)).reshape(n, k, -1), background)
+
+
+def _learn(counts: _Counts, views: Sequence[int], n_cameras: int, used: NDArray[np.bool_]) -> SurfaceColours:
+    background = np.zeros((n_cameras, *counts.background.shape[1:]), np.float32)
+    background[views] = counts.background / np.maximum(counts.background.sum(axis=(1, 2, 3), keepdims=True), 1)
+    raw = _normalise(np.einsum("vk,vkc->kc", used[views].astype(float), counts.classes))
+    cells = np.flatnonzero(raw.any(axis=0))
+    around = background.sum(axis=0).ravel()[cells] / max(len(views), 1)
+    distributions = np.zeros(raw.shape, np.float32)
+    distributions[:, cells] = _separate_classes(raw[:, cells], around)
+    distributions = distributions.reshape(len(raw), *background.shape[1:])
     return SurfaceColours(distributions, distributions, background, np.zeros((n_cameras, len(SURFACE_CLASSES))))
 
 
@@ -153,15 +171,16 @@ def learn_unoccluded(state: Array, regions: Sequence[PlayerRegion], n_cameras: i
         )
         for region in regions
     ]
+    counts, views = _count(regions, images), [region.view for region in regions]
     if len(regions) > 2:
         for region, image in zip(regions, images, strict=True):
             elsewhere = used.copy()
             elsewhere[region.view] = False
-            colours = learn_colours(regions, images, n_cameras, elsewhere)
+            colours = _learn(counts, views, n_cameras, elsewhere)
             occlusion[region.view] = occlusion_chance(*_mean_evidence(image.whole, region, colours))
         agreeing = used & (occlusion < _AT_EVEN)
         used = np.where(agreeing.any(axis=0), agreeing, used)
-    return replace(learn_colours(regions, images, n_cameras, used), occlusion=occlusion)
+    return replace(_learn(counts, views, n_cameras, used), occlusion=occlusion)
 
 
 def occlusion_chance(evidence: Array, expected: Array) -> Array:

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from airborne.tracking.capsules.bystanders import find_bystanders, occluding_capsules
+from airborne.tracking.capsules.bystanders import FOLLOWED_EVERY_S, find_bystanders, occluding_capsules
 from airborne.tracking.capsules.dynamics import N_FREE, N_SLIDING, GaussianState, predict, state_at_rest, update
 from airborne.tracking.capsules.equations import N_POINTS
 from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of, start_state
@@ -58,18 +58,24 @@ class Blocker:
         """Track one time; raises TrialError where no image of the first frame shows a player."""
         if not state.players:
             return self._first(frames)
-        n, tracks = len(state.players), [*state.players.values(), *state.bystanders]
-        names = [*state.players, *("bystander" for _ in state.bystanders)]
+        tracks = [*state.players.values(), *state.bystanders]
         expected = [_predict_track(track, frames.time_s) for track in tracks]
-        followed = []
-        for i, (name, track) in enumerate(zip(names, tracks, strict=True)):
+
+        def follow(i: int, name: str) -> tuple[Track, PlayerEstimate]:
             others = [each for j, (_, each) in enumerate(expected) if j != i and tracks[j].lost_s is None]
             occluders = occluding_capsules(expected[i][1], others)
-            followed.append(_track_player(name, track, frames, predicted=expected[i], occluders=occluders))
-        bystanders = tuple(track for track, each in followed[n:] if each.status is not Status.LOST)
-        players = dict(zip(names[:n], (track for track, _ in followed[:n]), strict=True))
-        estimates = {each.player: each for _, each in followed[:n]}
-        return self._look_for_lost(Everybody(players, bystanders), estimates, frames)
+            return _track_player(name, tracks[i], frames, predicted=expected[i], occluders=occluders)
+
+        players, estimates = {}, {}
+        for i, name in enumerate(state.players):
+            players[name], estimates[name] = follow(i, name)
+        bystanders = []
+        for i, track in enumerate(state.bystanders, len(players)):
+            is_due = frames.time_s - track.time_s >= FOLLOWED_EVERY_S
+            track, estimate = follow(i, "bystander") if is_due else (track, None)
+            if estimate is None or estimate.status is not Status.LOST:
+                bystanders.append(track)
+        return self._look_for_lost(Everybody(players, tuple(bystanders)), estimates, frames)
 
     def _look_for_lost(
         self, state: Everybody, estimates: dict[str, PlayerEstimate], frames: Frames

@@ -16,6 +16,7 @@ from airborne.tracking.capsules.floor_search import (
     Stander,
     evaluate_grid,
     find_standers,
+    floor_grid,
     lies_in,
     sum_support,
 )
@@ -171,11 +172,11 @@ class _Moment:
     @property
     def support(self) -> float:
         """What players there may tell in all [nat m2]."""
-        return sum_support(*evaluate_grid(self.views, self.wanted))
+        return sum_support(*evaluate_grid(self.views, floor_grid(self.wanted)))
 
     def search(self, whole: Callable[[int], Frames]) -> PlayersSearch:
         """Find the players and fit them to the whole pictures."""
-        standers = list(find_standers(self.views, self.zone, self.wanted))
+        standers = list(find_standers(self.views, floor_grid(self.zone), self.wanted))
         wanted = [stander for stander in standers if lies_in(self.wanted, stander.floor_m)]
         others = [stander.states[0] for stander in standers if not lies_in(self.wanted, stander.floor_m)]
         wanted.sort(key=lambda stander: stander.floor_m[0])
