@@ -71,7 +71,10 @@ def occluding_capsules(state: Array, others: Sequence[Array]) -> Capsules:
 
 
 def _between(players: Array, cameras: Array) -> tuple[Array, Array]:
-    """Return the zone (2, 2), from and to x, y [m], and places in it (n, 2), between players (k, 2) and cameras (v, 2)."""
+    """Return a zone (2, 2) of the floor, from and to x, y [m], and places (n, 2) in it between players and cameras.
+
+    players (k, 2) and cameras (v, 2) as seen from above.
+    """
     toward = (cameras[:, None] - players).reshape(-1, 2)
     length_m = np.linalg.norm(toward, axis=1)
     toward *= (np.minimum(1.0, _FARTHEST_M / length_m))[:, None]

@@ -26,7 +26,7 @@ from airborne.tracking.capsules.surface_colours import (
 from airborne.tracking.capsules.track import Everybody, Sighting, Track, evidence_per_px
 from airborne.tracking.capsules.unseen_legs import LEAST_GAIN, find_unseen_legs, free_leg
 from airborne.tracking.capsules.views import map_evidence, player_regions
-from airborne.tracking.estimate import Status
+from airborne.tracking.estimate import Status, worst_status
 from airborne.tracking.players import PlayerEstimate, PlayerStart, lost_player_estimate
 from airborne.tracking.time_offsets import compensate_at_velocity
 from airborne.types import Array
@@ -38,6 +38,7 @@ _CONTACT_M, _SLIP_SD_M = 0.02, 0.02  # a foot this low is in contact with the fl
 _AIRBORNE_M = 0.06  # both feet this far above their height in standing: airborne
 _LOST_SHARE = 0.25  # of the reference evidence per pixel; less counts as lost
 _LEAST_EVIDENCE = 0.3  # per pixel [nat]; less counts as lost
+_HIPS_AND_KNEES = 4  # the first joints: while these are tracked, colours and evidence are learned
 _REFERENCE_RATE = 0.05  # of the newest frame in the running reference
 
 
@@ -188,7 +189,7 @@ def _track_player(
     n_views = count_unoccluded(occlusion, views)
     occlusion = limit_occlusion(occlusion, views)
     estimate = estimate_player(name, frames, track, fitted=fitted, n_views=n_views)
-    if estimate.status is Status.TRACKED:
+    if worst_status(estimate.joint_status[:_HIPS_AND_KNEES]) is Status.TRACKED:
         track = replace(track, reference_evidence=reference + _REFERENCE_RATE * (evidence - reference))
         if frames.time_s - track.colours_updated_s >= COLOUR_UPDATE_S:
             colours = update_colours(replace(track.colours, occlusion=occlusion), track.state, regions, occluders)

@@ -41,7 +41,7 @@ def find_unseen_legs(owned: Array, reference_evidence: float) -> NDArray[np.intp
 def unmeasured_covariance(fit: JumperFit, reference_evidence: float) -> Array:
     """Return what nobody measured of points that fewer than two views show: (9, 3, 3) [m2].
 
-    Along the ray of the only view, or in all directions. A shank shows ankle and foot, thigh and shank together the knee.
+    Along the ray of the only view, or in all directions. A shank shows ankle and foot, both thigh and shank the knee.
     """
     thighs, shanks = (_shown(fit, capsules, reference_evidence) for capsules in (_THIGHS, _SHANKS))
     covariance = np.zeros((N_POINTS, 3, 3))
