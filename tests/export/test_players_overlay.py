@@ -98,6 +98,14 @@ def test_uncertain_players_are_amber_and_lost_ones_are_omitted(tmp_path):
         assert is_near(picture[80:, half:], GREEN_RGB, 100).any()
 
 
+def test_a_rod_with_an_uncertain_end_is_amber_and_the_others_stay_green(tmp_path):
+    hidden = player_estimate(joint_status=(*5 * (Status.TRACKED,), Status.UNCERTAIN))
+    picture = last_picture(tmp_path, [(frames(), hidden)], "paper")[80:, :320]
+    knee_px = BIG.px_from_world(points_of(PLAYERS["Anna"])[[3]])[0][1] - 80
+    is_amber = is_near(picture, STATUS_RGB[Status.UNCERTAIN])
+    assert is_amber[int(knee_px) + 20 :].any() and is_near(picture, GREEN_RGB, 100).any()
+
+
 @pytest.mark.parametrize("style", ["paper", "broadcast"])
 def test_a_missing_view_is_grey_and_has_no_graphic(tmp_path, style):
     picture = last_picture(

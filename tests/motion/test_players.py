@@ -90,6 +90,16 @@ def test_statuses_are_counted_player_by_player():
     assert [motion.count(player, Status.TRACKED) for player in PLAYERS] == [7, 5]
 
 
+def test_each_joint_has_its_own_status_and_a_player_the_worst_of_the_legs(tmp_path):
+    (step,) = steps(1)
+    doubtful = [(Status.TRACKED, Status.UNCERTAIN, Status.TRACKED), (Status.TRACKED, Status.TRACKED, Status.UNCERTAIN)]
+    run = [tuple(replace(each, joint_status=status) for each, status in zip(step, doubtful, strict=True))]
+    result = read_players(written(tmp_path / "joints.csv", run))
+    assert_same(result, PlayersMotion.collect(run, JOINTS))
+    assert result.joint_status[0].tolist() == [[status.value for status in each] for each in doubtful]
+    assert result.status[0].tolist() == ["uncertain", "tracked"], "the torso is no leg"
+
+
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.4, 0.75, 1.0])
 def test_a_run_that_was_cut_off_anywhere_is_completed_to_the_same_file(tmp_path, share):
     run = steps(6)

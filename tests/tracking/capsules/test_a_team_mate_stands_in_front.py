@@ -1,12 +1,15 @@
 """Two team-mates in the same colours, whom nobody entered, hide the player's legs from two of three cameras."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
-from airborne.tracking.capsules.bystanders import find_bystanders, occluding_capsules
+from airborne.tracking.capsules.bystanders import LOOK_S, find_bystanders, occluding_capsules
 from airborne.tracking.capsules.first_frame import start_state
+from airborne.tracking.capsules.tracker import look_for_others
 from tests.support.jumping_scenes import Hall, errors_mm, hop, tracked
 
 N = 40
@@ -60,6 +63,20 @@ def test_followed_as_occluders_they_halve_the_errors_at_least(crowd, starts, est
     monkeypatch.setattr("airborne.tracking.capsules.tracker.find_bystanders", lambda players, frames: [])
     [alone] = tracked(crowd, range(N), starts)
     assert errors_mm(crowd, estimates).mean() < 0.5 * errors_mm(crowd, alone).mean()
+
+
+def test_those_who_came_later_are_found_while_the_player_is_uncertain(crowd, starts, monkeypatch):
+    monkeypatch.setattr("airborne.tracking.capsules.tracker.find_bystanders", lambda players, frames: [])
+    blocker = Blocker(starts)
+    alone, estimates = blocker.step(blocker.init(), crowd.frames(0))
+    monkeypatch.undo()
+    doubtful = {each.player: replace(each, joint_status=9 * (Status.UNCERTAIN,)) for each in estimates}
+    sure = {each.player: replace(each, joint_status=9 * (Status.TRACKED,)) for each in estimates}
+    later = replace(crowd.frames(1), time_s=LOOK_S)
+    assert alone.bystanders == ()
+    assert len(look_for_others(alone, doubtful, later).bystanders) == len(MATES_M)
+    assert look_for_others(alone, doubtful, crowd.frames(1)) is alone, "they were looked for just now"
+    assert look_for_others(alone, sure, later) is alone, "nobody hides the player"
 
 
 def test_a_shank_that_one_camera_shows_is_uncertain_along_its_ray(crowd, starts):

@@ -20,6 +20,8 @@ from airborne.video.small import shrink
 
 # chosen by hand on synthetic blocks; without others the joints err by the same 18.8 mm: blocker_variants.csv
 FOLLOWED_EVERY_S = Fraction(1, 20)  # others; between, they are predicted
+LOOK_S = Fraction(5)  # between looks for others, of which one takes 0.3 s at 1080p
+APART_M = 0.3  # of the hips of two people at least: who is nearer to a player is that player
 _NEAR_M = 3.0  # others further away do not occlude
 _FARTHEST_M, _MARGIN_M = 4.0, 1.0  # from a player toward each camera, and beside that way: where others are looked for
 _WIDTH_PX = 320  # of the pictures in which others are looked for
@@ -30,8 +32,8 @@ _HEAD_TOP, _HEAD_RADIUS = 0.136, 0.05  # over the chest, and of the head: shares
 _N_OCCLUDING = N_CAPSULES + 1  # capsules of one person, with the head
 
 
-def find_bystanders(players: Sequence[Array], frames: Frames) -> list[FirstFrameFit]:
-    """Find and fit who stands between players, states (35,) each, and the cameras."""
+def find_bystanders(players: Sequence[Array], frames: Frames, known: Sequence[Array] = ()) -> list[FirstFrameFit]:
+    """Find and fit who stands between players and the cameras, beside those who are known: states (35,) each."""
     views = [shrink(view, _WIDTH_PX) for view in frames.views if view is not None]
     if len(views) < 2:
         return []
@@ -39,14 +41,14 @@ def find_bystanders(players: Sequence[Array], frames: Frames) -> list[FirstFrame
         np.array([state[:2] for state in players]), np.array([view.camera.centre[:2] for view in views])
     )
     colours = ColourViews.of(views, zone)
-    for state in players:
+    for state in (*players, *known):
         colours = colours.without(state)
     standers = find_standers(colours, places, np.full((2, 2), np.nan))
     states = [stander.states[0] for stander in standers if stander.support[0] > _LEAST_SUPPORT]
     found = []
     for i, state in enumerate(states):
         joints_m: dict[str, Array] = dict(zip(JOINTS, points_of(state), strict=True))
-        occluders = occluding_capsules(state, [*players, *states[:i], *states[i + 1 :]])
+        occluders = occluding_capsules(state, [*players, *known, *states[:i], *states[i + 1 :]])
         fitted = fit_first_frame(f"bystander {i}", joints_m, frames, occluders, looser=_LOOSER)
         if evidence_per_px(fitted.fit.owned) > _LEAST_EVIDENCE:
             found.append(fitted)

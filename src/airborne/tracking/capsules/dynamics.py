@@ -57,19 +57,26 @@ def state_at_rest(free: Array, covariance: Array) -> GaussianState:
     return GaussianState(np.concatenate([free, np.zeros(N_DOF)]), full_covariance)
 
 
+def predict_mean(previous: GaussianState, dt_s: float, sliding: Array, *, is_airborne: bool) -> Array:
+    """Return the mean (40,) of what `predict` expects, alone."""
+    mean, decay = previous.mean.copy(), _decay(dt_s)
+    mean[:N_DOF] += dt_s * mean[N_FREE:]
+    mean[N_DOF:N_FREE] = decay * mean[N_DOF:N_FREE] + (1 - decay) * sliding
+    if is_airborne:
+        mean[2] -= 0.5 * GRAVITY_M_S2 * dt_s**2
+        mean[N_FREE + 2] -= GRAVITY_M_S2 * dt_s
+    return mean
+
+
 def predict(previous: GaussianState, dt_s: float, sliding: Array, *, is_airborne: bool) -> GaussianState:
     """Predict dt_s [s] ahead; sliding (4,) are the lengths that clothes return to; airborne hips fall freely."""
     F = np.eye(N_FILTERED)
     F[:N_DOF, N_FREE:] = dt_s * np.eye(N_DOF)
-    decay = np.exp(-_SLIDING_RETURN_RATE * dt_s)
-    F[N_DOF:N_FREE, N_DOF:N_FREE] *= decay
-    mean = F @ previous.mean
-    mean[N_DOF:N_FREE] += (1 - decay) * sliding
+    F[N_DOF:N_FREE, N_DOF:N_FREE] *= _decay(dt_s)
+    mean = predict_mean(previous, dt_s, sliding, is_airborne=is_airborne)
     sd = _ACCELERATION_SD.copy()
     if is_airborne:
         sd[:3] = _AIRBORNE_SD
-        mean[2] -= 0.5 * GRAVITY_M_S2 * dt_s**2
-        mean[N_FREE + 2] -= GRAVITY_M_S2 * dt_s
     covariance = F @ previous.covariance @ F.T
     position, velocity = np.arange(N_DOF), N_FREE + np.arange(N_DOF)
     covariance[position, position] += sd**2 * dt_s**4 / 4
@@ -79,6 +86,11 @@ def predict(previous: GaussianState, dt_s: float, sliding: Array, *, is_airborne
     slide = N_DOF + np.arange(N_SLIDING)
     covariance[slide, slide] += _SLIDING_SD**2 * dt_s
     return GaussianState(mean, covariance)
+
+
+def _decay(dt_s: float) -> float:
+    """Return by how much clothes still differ from where they return to."""
+    return float(np.exp(-_SLIDING_RETURN_RATE * dt_s))
 
 
 def update(expected: GaussianState, free: Array, covariance: Array) -> GaussianState:

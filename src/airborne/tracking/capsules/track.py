@@ -53,7 +53,8 @@ class Everybody(NamedTuple):
     """Who is followed: the players, by name, and others who may hide them."""
 
     players: Mapping[str, Track]
-    bystanders: tuple[Track, ...]
+    bystanders: tuple[Track, ...] = ()
+    looked_s: Fraction = Fraction(0)  # when others were looked for
 
 
 def evidence_per_px(owned: Array) -> float:

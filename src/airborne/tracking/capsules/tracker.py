@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 
-from airborne.tracking.capsules.bystanders import FOLLOWED_EVERY_S, find_bystanders, occluding_capsules
-from airborne.tracking.capsules.dynamics import N_FREE, N_SLIDING, GaussianState, predict, state_at_rest, update
+from airborne.tracking.capsules.bystanders import (
+    APART_M,
+    FOLLOWED_EVERY_S,
+    LOOK_S,
+    find_bystanders,
+    occluding_capsules,
+)
+from airborne.tracking.capsules.dynamics import (
+    N_FREE,
+    N_SLIDING,
+    GaussianState,
+    predict,
+    predict_mean,
+    state_at_rest,
+    update,
+)
 from airborne.tracking.capsules.equations import N_POINTS
 from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of, start_state
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, fit_jumper
@@ -53,19 +67,18 @@ class Blocker:
 
     def init(self) -> Everybody:
         """Return the state before the first frame: nobody."""
-        return Everybody({}, ())
+        return Everybody({})
 
     def step(self, state: Everybody, frames: Frames) -> tuple[Everybody, tuple[PlayerEstimate, ...]]:
         """Track one time; raises TrialError where no image of the first frame shows a player."""
         if not state.players:
             return self._first(frames)
         tracks = [*state.players.values(), *state.bystanders]
-        expected = [_predict_track(track, frames.time_s) for track in tracks]
+        expected = [_expected_state(track, frames.time_s) for track in tracks]
 
         def follow(i: int, name: str) -> tuple[Track, PlayerEstimate]:
-            others = [each for j, (_, each) in enumerate(expected) if j != i and tracks[j].lost_s is None]
-            occluders = occluding_capsules(expected[i][1], others)
-            return _track_player(name, tracks[i], frames, predicted=expected[i], occluders=occluders)
+            others = [each for j, each in enumerate(expected) if j != i and tracks[j].lost_s is None]
+            return _track_player(name, tracks[i], frames, occluders=occluding_capsules(expected[i], others))
 
         players, estimates = {}, {}
         for i, name in enumerate(state.players):
@@ -74,9 +87,12 @@ class Blocker:
         for i, track in enumerate(state.bystanders, len(players)):
             is_due = frames.time_s - track.time_s >= FOLLOWED_EVERY_S
             track, estimate = follow(i, "bystander") if is_due else (track, None)
-            if estimate is None or estimate.status is not Status.LOST:
+            is_lost = estimate is not None and estimate.status is Status.LOST
+            hips_m = [np.linalg.norm(track.state[:3] - each.state[:3]) for each in players.values()]
+            if not is_lost and min(hips_m) > APART_M:
                 bystanders.append(track)
-        return self._look_for_lost(Everybody(players, tuple(bystanders)), estimates, frames)
+        followed = state._replace(players=players, bystanders=tuple(bystanders))
+        return self._look_for_lost(look_for_others(followed, estimates, frames), estimates, frames)
 
     def _look_for_lost(
         self, state: Everybody, estimates: dict[str, PlayerEstimate], frames: Frames
@@ -104,7 +120,7 @@ class Blocker:
                 estimates[name] = replace(estimates[name], note=note)
                 if name in look.fits:
                     tracks[name], estimates[name] = _take_up(name, tracks[name], look.fits[name], frames)
-        return Everybody(tracks, state.bystanders), tuple(estimates.values())
+        return state._replace(players=tracks), tuple(estimates.values())
 
     def _first(self, frames: Frames) -> tuple[Everybody, tuple[PlayerEstimate, ...]]:
         tracks, estimates = {}, []
@@ -127,7 +143,19 @@ class Blocker:
             estimates.append(
                 estimate if estimate.score > _LEAST_EVIDENCE else lost_player_estimate(start.name, frames, len(JOINTS))
             )
-        return Everybody(tracks, tuple(_first_track(each, frames) for each in found)), tuple(estimates)
+        bystanders = tuple(_first_track(each, frames) for each in found)
+        return Everybody(tracks, bystanders, frames.time_s), tuple(estimates)
+
+
+def look_for_others(state: Everybody, estimates: Mapping[str, PlayerEstimate], frames: Frames) -> Everybody:
+    """Look who came before the cameras since the last look, where a player is uncertain."""
+    players = [state.players[name].state for name, each in estimates.items() if each.status is Status.UNCERTAIN]
+    if not players or frames.time_s - state.looked_s < LOOK_S:
+        return state
+    known = [*state.bystanders, *(track for track in state.players.values() if track.lost_s is None)]
+    found = find_bystanders(players, frames, [track.state for track in known])
+    bystanders = (*state.bystanders, *(_first_track(each, frames) for each in found))
+    return state._replace(bystanders=bystanders, looked_s=frames.time_s)
 
 
 def _first_track(first: FirstFrameFit, frames: Frames) -> Track:
@@ -146,23 +174,23 @@ def _first_track(first: FirstFrameFit, frames: Frames) -> Track:
     )
 
 
-def _predict_track(track: Track, time_s: Fraction) -> tuple[GaussianState, Array]:
-    """Predict a player: the Gaussian, and the whole state (35,)."""
-    is_airborne = bool(np.all(points_of(track.state)[6:8, 2] > FOOT_HEIGHT_M + _AIRBORNE_M))
-    filtered = predict(track.filtered, float(time_s - track.time_s), track.sliding, is_airborne=is_airborne)
-    return filtered, np.concatenate([filtered.free, track.state[N_FREE:]])
+def _expected_state(track: Track, time_s: Fraction) -> Array:
+    """Return the state (35,) in which a player is expected."""
+    mean = predict_mean(
+        track.filtered, float(time_s - track.time_s), track.sliding, is_airborne=_is_airborne(track.state)
+    )
+    return np.concatenate([mean[:N_FREE], track.state[N_FREE:]])
 
 
-def _track_player(
-    name: str,
-    track: Track,
-    frames: Frames,
-    *,
-    predicted: tuple[GaussianState, Array],
-    occluders: Capsules,
-) -> tuple[Track, PlayerEstimate]:
-    """Fit a player from the prediction of `_predict_track`."""
-    expected, state = predicted
+def _is_airborne(state: Array) -> bool:
+    return bool(np.all(points_of(state)[6:8, 2] > FOOT_HEIGHT_M + _AIRBORNE_M))
+
+
+def _track_player(name: str, track: Track, frames: Frames, *, occluders: Capsules) -> tuple[Track, PlayerEstimate]:
+    """Fit a player to images, from where the last estimate leads."""
+    dt_s, is_airborne = float(frames.time_s - track.time_s), _is_airborne(track.state)
+    expected = predict(track.filtered, dt_s, track.sliding, is_airborne=is_airborne)
+    state = np.concatenate([expected.free, track.state[N_FREE:]])
     regions = player_regions(compensate_at_velocity(frames, expected.hips_velocity_m_s), state[:3])
     if not regions:
         return replace(track, filtered=expected, time_s=frames.time_s), lost_player_estimate(name, frames, len(JOINTS))
