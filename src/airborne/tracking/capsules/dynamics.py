@@ -26,7 +26,7 @@ _ACCELERATION_SD = _CORRELATION * np.array(  # [m/s2], [rad/s2]
 # of the hips in the air, about free fall: the limbs move about the centre of mass
 _AIRBORNE_SD = _CORRELATION * 8.0
 FIRST_SPEED_SD = np.array([1.0] * 3 + [2.0] * 15)  # [m/s], [rad/s]
-# chosen by hand; at a hundredth of it the joints err by 22.1 mm, not 18.8: blocker_variants.csv, clothes that stay
+# chosen by hand; at a hundredth of it the joints err by 24.3 mm, not 20.9: blocker_variants.csv, clothes that stay
 _SLIDING_SD = np.array([0.02, 0.20, 0.03, 0.05])  # per sqrt(s): [m], shares, shares, [m]
 _SLIDING_RETURN_RATE = 1.2  # [1/s] decay to the first frame's values
 

@@ -24,7 +24,7 @@ _DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 0.1, 0.03, 2.0  # first, least, most
 _CAUCHY_SCALE = 4.0  # squared sds at which an anchor's weight is halved
 _FEET = (6, 7)  # rows of the points
 # weak prior of the posture: upright, legs under the hips, both bent alike
-# chosen by hand; without it the joints err by 19.6 mm, not 18.8: blocker_variants.csv, without habits
+# chosen by hand; without it the joints err by 21.6 mm, not 20.9: blocker_variants.csv, without habits
 _POSTURE_SD = np.array([0.2, 0.5, 0.3, 0.15] + [0.25, 0.3, 0.4] * 2 + [0.5, 0.6])
 _POSTURE = np.zeros((len(_POSTURE_SD), N_DOF))
 _POSTURE[np.arange(10), [4, 5, 6, 7, 9, 10, 12, 14, 15, 17]] = 1  # side and forward lean, bends, hip y and z, ankle

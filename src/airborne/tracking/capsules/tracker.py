@@ -46,7 +46,7 @@ from airborne.tracking.time_offsets import compensate_at_velocity
 from airborne.types import Array
 from airborne.video import Frames
 
-# chosen by hand on synthetic blocks; without these the joints err by 18.6 to 19.0 mm, with them by 18.8:
+# chosen by hand on synthetic blocks; without these the joints err by 20.8 to 21.4 mm, with them by 20.9:
 # benchmarks/results/blocker_variants.csv, without other players, standing feet, flight, hidden views
 _CONTACT_M, _SLIP_SD_M = 0.02, 0.02  # a foot this low is in contact with the floor; how far it slips in a frame
 _AIRBORNE_M = 0.06  # both feet this far above their height in standing: airborne
