@@ -36,7 +36,8 @@ def append(name: str, rows: list[dict]) -> None:
             value = f"{row['value']:.3g}" if isinstance(row["value"], float) else row["value"]
             writer.writerow({**common, **row, "value": value})
             floor = f"  (floor {row['floor']})" if row.get("floor") else ""
-            print(f"{row['data']:<40} {row['method']:<12} {row['metric']:<40} {value:>8} {row['unit']}{floor}", flush=True)
+            what = f"{row['data']:<40} {row['method']:<12} {row['metric']:<40}"
+            print(f"{what} {value:>8} {row['unit']}{floor}", flush=True)
 
 
 def newest_rows(path: Path) -> list[dict[str, str]]:
