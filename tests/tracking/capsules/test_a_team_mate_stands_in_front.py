@@ -48,6 +48,13 @@ def test_one_camera_finds_nobody(crowd, starts):
     assert find_bystanders([start_state("anna", starts[0].joints_m)], frames) == []
 
 
+def test_nobody_is_found_beside_a_player_who_is_nowhere_or_right_below_a_camera(hall):
+    frames, state = hall.frames(0), hall.motions["anna"](0.0)
+    for floor_m in ((500.0, 500.0), frames.views[0].camera.centre[:2]):
+        assert find_bystanders([np.r_[floor_m, state[2:]]], frames) == []
+    assert find_bystanders([], frames) == []
+
+
 def test_only_the_player_is_estimated(estimates):
     assert {each.player for each in estimates} == {"anna"}
 

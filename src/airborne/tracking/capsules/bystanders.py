@@ -35,7 +35,7 @@ _N_OCCLUDING = N_CAPSULES + 1  # capsules of one person, with the head
 def find_bystanders(players: Sequence[Array], frames: Frames, known: Sequence[Array] = ()) -> list[FirstFrameFit]:
     """Find and fit who stands between players and the cameras, beside those who are known: states (35,) each."""
     views = [shrink(view, _WIDTH_PX) for view in frames.views if view is not None]
-    if len(views) < 2:
+    if len(views) < 2 or not players:
         return []
     zone, places = _between(
         np.array([state[:2] for state in players]), np.array([view.camera.centre[:2] for view in views])
@@ -77,9 +77,8 @@ def _between(players: Array, cameras: Array) -> tuple[Array, Array]:
 
     players (k, 2) and cameras (v, 2) as seen from above.
     """
-    toward = (cameras[:, None] - players).reshape(-1, 2)
-    length_m = np.linalg.norm(toward, axis=1)
-    toward *= (np.minimum(1.0, _FARTHEST_M / length_m))[:, None]
+    toward = (cameras[:, None] - players).reshape(-1, 2) + 1e-9  # a camera may hang right above a player
+    toward *= np.minimum(1.0, _FARTHEST_M / np.linalg.norm(toward, axis=1))[:, None]
     origins = np.tile(players, (len(cameras), 1))
     points = np.vstack([players, origins + toward])
     zone = np.array([points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M])

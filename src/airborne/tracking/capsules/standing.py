@@ -113,6 +113,8 @@ class ColourViews:
         """Sort the colours of what players in a zone of the floor (2, 2), from and to x, y [m], may cover."""
         features = [colour_features(view.rgb) for view in views]
         here = np.concatenate([each[_shows(view, zone)] for view, each in zip(views, features, strict=True)])
+        if not len(here):  # no view shows the zone: any colour will do
+            here = features[0].reshape(-1, features[0].shape[-1])[:1]
         rng = np.random.default_rng(0)
         here = here[rng.choice(len(here), min(len(here), _MOST_PIXELS), replace=False)]
         with warnings.catch_warnings():
