@@ -84,6 +84,8 @@ def test_those_who_came_later_are_found_while_the_player_is_uncertain(crowd, sta
     assert len(look_for_others(alone, doubtful, later).bystanders) == len(MATES_M)
     assert look_for_others(alone, doubtful, crowd.frames(1)) is alone, "they were looked for just now"
     assert look_for_others(alone, sure, later) is alone, "nobody hides the player"
+    lost = {"ben": replace(estimates[0], joint_status=9 * (Status.LOST,))}
+    assert look_for_others(alone, doubtful | lost, later) is alone, "they might be the lost one"
 
 
 def test_a_shank_that_one_camera_shows_is_uncertain_along_its_ray(crowd, starts):

@@ -148,12 +148,16 @@ class Blocker:
 
 
 def look_for_others(state: Everybody, estimates: Mapping[str, PlayerEstimate], frames: Frames) -> Everybody:
-    """Look who came before the cameras since the last look, where a player is uncertain."""
-    players = [state.players[name].state for name, each in estimates.items() if each.status is Status.UNCERTAIN]
-    if not players or frames.time_s - state.looked_s < LOOK_S:
+    """Look who came before the cameras since the last look, where a player is uncertain and none lost.
+
+    Whoever is found might be the lost one.
+    """
+    statuses = {name: estimate.status for name, estimate in estimates.items()}
+    players = [state.players[name].state for name, status in statuses.items() if status is Status.UNCERTAIN]
+    if not players or Status.LOST in statuses.values() or frames.time_s - state.looked_s < LOOK_S:
         return state
-    known = [*state.bystanders, *(track for track in state.players.values() if track.lost_s is None)]
-    found = find_bystanders(players, frames, [track.state for track in known])
+    known = [track.state for track in (*state.players.values(), *state.bystanders)]
+    found = find_bystanders(players, frames, known)
     bystanders = (*state.bystanders, *(_first_track(each, frames) for each in found))
     return state._replace(bystanders=bystanders, looked_s=frames.time_s)
 
