@@ -71,8 +71,8 @@ def label_joints(motion: Motion, model: BodyModel) -> xr.Dataset:
 def label_players(motion: PlayersMotion) -> xr.Dataset:
     """Label players' joints: as of a body with a dimension `player` after time, and with `covariance` [m2].
 
-    `covariance` (time, player, joint, space, space_2) is that of each joint for itself, `status` (time, player) the worst
-    `joint_status` (time, player, joint) of hips, knees and ankles.
+    `covariance` (time, player, joint, space, space_2) is that of each joint for itself; `status` (time, player) is the
+    worst `joint_status` (time, player, joint) of hips, knees and ankles.
     """
     per_player = ("time", "player")
     variables = {
