@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from airborne.errors import count
 from airborne.tracking.capsules.bystanders import (
     APART_M,
     FOLLOWED_EVERY_S,
@@ -143,6 +144,9 @@ class Blocker:
             estimates.append(
                 estimate if estimate.score > _LEAST_EVIDENCE else lost_player_estimate(start.name, frames, len(JOINTS))
             )
+        if found:
+            note = f"followed as they may hide players: {count(len(found), 'bystander')}"
+            estimates[0] = replace(estimates[0], note=note)
         bystanders = tuple(_first_track(each, frames) for each in found)
         return Everybody(tracks, bystanders, frames.time_s), tuple(estimates)
 
