@@ -73,6 +73,12 @@ def test_followed_as_occluders_they_halve_the_errors_at_least(crowd, starts, est
     assert errors_mm(crowd, estimates).mean() < 0.5 * errors_mm(crowd, alone).mean()
 
 
+def test_a_shank_that_two_cameras_show_is_known_all_round(hall):
+    [estimates] = tracked(hall, range(3))
+    off = [np.sqrt(np.linalg.eigvalsh(each.covariance[4]).max()) for each in estimates]
+    assert max(off) < 0.08
+
+
 def test_those_who_came_later_are_found_while_the_player_is_uncertain(crowd, starts, monkeypatch):
     monkeypatch.setattr("airborne.tracking.capsules.tracker.find_bystanders", lambda players, frames: [])
     blocker = Blocker(starts)

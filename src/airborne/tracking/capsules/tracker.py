@@ -229,9 +229,8 @@ def _track_player(name: str, track: Track, frames: Frames, *, occluders: Capsule
         track = replace(track, reference_evidence=reference + _REFERENCE_RATE * (evidence - reference))
         if frames.time_s - track.colours_updated_s >= COLOUR_UPDATE_S:
             colours = update_colours(replace(track.colours, occlusion=occlusion), track.state, regions, occluders)
-            return replace(
-                track, colours=colours, colours_updated_s=frames.time_s, tables=evidence_tables(colours)
-            ), estimate
+            track = replace(track, colours=colours, colours_updated_s=frames.time_s, tables=evidence_tables(colours))
+            return track, estimate
     return with_occlusion(track, occlusion), estimate
 
 

@@ -20,9 +20,7 @@ _THIGHS, _SHANKS = [4, 7], [5, 8]  # capsules
 # share of a capsule above which it counts as shown. In synthetic blocks 7001 to 7004, whole, at half the size and
 # without a camera each, 19 % of the ankles that fewer than two views showed lay 0.1 m off or more, 1.5 % of the others
 _LEAST_SHOWN = 0.15
-_UNMEASURED_SD_M = (
-    0.10  # of such ankles and feet along the only ray: 0.093 and 0.097 m there, 0.095 m where none showed
-)
+_UNMEASURED_SD_M = 0.10  # of such ankles and feet along the only ray: 0.093 and 0.097 m there
 LEAST_GAIN = 10.0  # [nat] of a leg that was found elsewhere: there 60 or more, where it was right all along up to 1
 LEG_SD_RAD = np.array([0.5, 0.4, 0.4, 0.5, 0.4])  # of a leg of which nothing is known: hip, knee, ankle
 _MIRROR = np.array([1.0, -1.0, -1.0, 1.0, 1.0])  # from one leg's angles to the other's
@@ -61,10 +59,8 @@ def _shown(fit: JumperFit, capsules: Sequence[int], reference_evidence: float) -
     That is their evidence as a share of the player's usual [nat a pixel] on the whole capsule, as large as it is in the
     view that shows most of it.
     """
-    depths = fit.cameras[:, 2] @ [*fit.state[:3], 1.0]
-    evidence, area = (
-        np.moveaxis(fit.owned[:, capsules].sum(axis=2), -1, 0) * (depths / fit.cameras[:, 3, 0])[:, None] ** 2
-    )
+    m_per_px = fit.cameras[:, 2] @ [*fit.state[:3], 1.0] / fit.cameras[:, 3, 0]
+    evidence, area = np.moveaxis(fit.owned[:, capsules].sum(axis=2), -1, 0) * m_per_px[:, None] ** 2
     return evidence / np.maximum(reference_evidence * area.max(axis=0), 1e-9)
 
 
