@@ -55,7 +55,8 @@ class PlayersOverlayVideos:
     def write(self, frames: Frames, joints: Sequence[str], estimates: Sequence[PlayerEstimate]) -> None:
         """Append what every camera saw at one time, with every player drawn who is not lost."""
         at = [joints.index(name) for name in LEG_POINTS]
-        located = {e.player: (e.points[at], e.status) for e in estimates if e.status is not Status.LOST}
+        found = [estimate for estimate in estimates if estimate.status is not Status.LOST]
+        located = {each.player: (each.points[at], each.status) for each in found}
         heights = self._heights.update(located)
         jumpers = [
             Jumper(player, points, heights[player], is_sure=status is Status.TRACKED)
@@ -68,10 +69,9 @@ class PlayersOverlayVideos:
             if self._style == "broadcast":
                 draw_heights(image, camera, jumpers if view is not None else [])
             else:
-                for estimate in estimates if view is not None else ():
-                    if estimate.player in located:
-                        own = [estimate.joint_status[k] for k in at]
-                        _draw_rods(image, camera, estimate.player, points=estimate.points[at], statuses=own)
+                for each in found if view is not None else ():
+                    own = [each.joint_status[k] for k in at]
+                    _draw_rods(image, camera, each.player, points=each.points[at], statuses=own)
                 draw_label(image, time_label(frames, status), STATUS_RGB[status])
             images.append(image)
         self._videos.write(frames.index, images)

@@ -153,6 +153,7 @@ def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
 def heights_figure(motion: PlayersMotion) -> Figure:
     """Draw the height of the middle of each player's hips, knees and ankles."""
     figure, grid = panels.panel_figure(len(motion.players), 1, row_in=2.2)
+    status = motion.status
     for k, (player, (axes,)) in enumerate(zip(motion.players, grid, strict=True)):
         for part, colour in _JOINT_COLOURS.items():
             pair = [motion.joints.index(f"{part}_{side}") for side in ("left", "right")]
@@ -161,8 +162,8 @@ def heights_figure(motion: PlayersMotion) -> Figure:
             two_sd = np.where(np.isfinite(two_sd), two_sd, np.nan)
             axes.plot(motion.time_s, middle, color=colour, linewidth=1.2, label=f"{part}s")
             axes.fill_between(motion.time_s, middle - two_sd, middle + two_sd, color=colour, alpha=0.2, linewidth=0)
-        panels.shade_spans(axes, motion.time_s, motion.status[:, k] == Status.LOST.value, panels.LOST_STYLE)
-        panels.shade_spans(axes, motion.time_s, motion.status[:, k] == Status.UNCERTAIN.value, _UNCERTAIN_STYLE)
+        panels.shade_spans(axes, motion.time_s, status[:, k] == Status.LOST.value, panels.LOST_STYLE)
+        panels.shade_spans(axes, motion.time_s, status[:, k] == Status.UNCERTAIN.value, _UNCERTAIN_STYLE)
         panels.label_panel(axes, f"{player}: height [m]")
         panels.begin_at_zero(axes)
     handles, labels = grid[0][0].get_legend_handles_labels()

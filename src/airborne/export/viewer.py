@@ -18,14 +18,13 @@ from airborne.export.takes import Take, body_take, player_takes
 from airborne.motion import Motion, PlayersMotion, joint_angles, root_angles
 from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.joints import main_joints
+from airborne.motion.players import worst_of
 from airborne.motion.run_folder import PICTURES, VIDEOS
-from airborne.tracking import Status
 from airborne.types import Array
 
 _MOST_ROWS = 5000  # of curves; of a longer run every n-th frame
 _MOST_IN_3D = 3000  # frames; a longer run has no body in 3D here
 _DIGITS = 5  # of a number
-_WORST_FIRST = (Status.LOST, Status.UNCERTAIN, Status.TRACKED)
 
 Viewer = dict[str, Any]
 
@@ -40,11 +39,9 @@ def body_viewer(folder: Path, motion: Motion, model: BodyModel) -> Viewer:
 
 def players_viewer(folder: Path, motion: PlayersMotion) -> Viewer:
     """Return what is shown of a run of players, of each the heights of hips, knees and ankles."""
-    ranks = np.stack([motion.status == status.value for status in _WORST_FIRST]).any(axis=2)
-    status = np.array([status.value for status in _WORST_FIRST])[np.argmax(ranks, axis=0)]
     groups = list(_player_groups(motion))
     takes = _in_3d(motion.index, lambda: player_takes(motion))
-    return _viewer(folder, motion.index, motion.time_s, status, groups=groups, takes=takes)
+    return _viewer(folder, motion.index, motion.time_s, worst_of(motion.status), groups=groups, takes=takes)
 
 
 def _viewer(

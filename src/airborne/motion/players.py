@@ -84,9 +84,7 @@ class PlayersMotion:
     def status(self) -> NDArray[np.str_]:
         """Each player's status, the worst of hips, knees and ankles, or of all joints without these: (n, players)."""
         legs = [k for k, name in enumerate(self.joints) if name in LEG_POINTS] or list(range(len(self.joints)))
-        statuses = np.array([status.value for status in Status])
-        ranks = (self.joint_status[..., legs, None] == statuses).argmax(axis=-1)
-        return statuses[ranks.max(axis=-1)]
+        return worst_of(self.joint_status[..., legs])
 
     @property
     def sd(self) -> Array:
@@ -96,6 +94,12 @@ class PlayersMotion:
     def count(self, player: str, status: Status) -> int:
         """Count the frames in which a player has a status."""
         return int(np.sum(self.status[:, self.players.index(player)] == status.value))
+
+
+def worst_of(status: NDArray[np.str_]) -> NDArray[np.str_]:
+    """Return the status (...) that can be trusted least of several (..., n)."""
+    statuses = np.array([each.value for each in Status])
+    return statuses[(status[..., None] == statuses).argmax(axis=-1).max(axis=-1)]
 
 
 class PlayersWriter:

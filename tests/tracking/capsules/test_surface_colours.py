@@ -7,7 +7,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.cameras import Camera
 from airborne.tracking.capsules.jumper import N_DOF, SHIRT, SHOE, SHORTS, SKIN, SURFACE_CLASSES
 from airborne.tracking.capsules.kernel_arguments import NOBODY, Capsules
-from airborne.tracking.capsules.surface_colours import ClassImages, class_image, learn_colours, update_colours
+from airborne.tracking.capsules.surface_colours import (
+    ClassImages,
+    class_image,
+    count_surfaces,
+    learn_colours,
+    update_colours,
+)
 from airborne.tracking.capsules.views import PlayerRegion
 from tests.support.jumping_scenes import LENGTHS, RADII
 
@@ -49,7 +55,9 @@ def coloured(colour, n=40):
     part = np.full((n, n), -1, np.int8)
     part[10:30, 10:30] = SKIN
     region = PlayerRegion(0, looking(1), (0, 0, n, n), rgb)
-    return learn_colours([region], [ClassImages(part, part, part)], 1, np.ones((1, len(SURFACE_CLASSES)), bool))
+    return learn_colours(
+        count_surfaces([region], [ClassImages(part, part, part)]), [0], 1, np.ones((1, len(SURFACE_CLASSES)), bool)
+    )
 
 
 def evidence_of(colours, colour, surface_class=SKIN):
@@ -81,7 +89,9 @@ def dressed(shoe, others=NOBODY):
 def at_first():
     region = dressed(WORN[SHOE])
     part, around = class_image(STANDING, looking(1), 0.6), class_image(STANDING, looking(1), 1.25)
-    return learn_colours([region], [ClassImages(part, part, around)], 1, np.ones((1, len(SURFACE_CLASSES)), bool))
+    return learn_colours(
+        count_surfaces([region], [ClassImages(part, part, around)]), [0], 1, np.ones((1, len(SURFACE_CLASSES)), bool)
+    )
 
 
 def test_shoes_are_recognised_by_their_soles_once_learned():

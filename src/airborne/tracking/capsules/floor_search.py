@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from airborne.tracking.capsules.standing import (
     states_of,
 )
 from airborne.types import Array
+from airborne.video import View
 
 _GRID_M = 0.15  # between stances on the floor
 _KNEES = (0.4, 0.8, 1.2)  # [rad] the crouches on the grid
@@ -26,6 +27,7 @@ _HEADINGS = (np.pi, 0.0)  # from which a stance is improved
 _APART_M = 0.5  # of two players on the grid
 _LEAST_SUPPORT = 0.7  # [nat m2] on the grid; what tells less is nobody
 _LEAST_STANDING = 0.9  # [nat m2] on the grid, what is more counts for a moment: ghosts between players tell less
+_LEAST_OF_SOMEBODY = 1.1  # [nat m2] of somebody whom nobody expects, see `tracking.first_pose.players`
 _MOST_PLAYERS = 16  # of two teams with their substitutes on the floor
 _AS_WELL = 0.95  # share of what the best stance tells, with which another is kept
 _N_DRAWS, _N_BEST, _N_ROUNDS = 150, 20, 12  # of the cross-entropy search
@@ -82,6 +84,19 @@ def find_standers(views: ColourViews, places: Array, wanted: Array) -> Iterator[
         yield stander
         views = views.without(stander.states[0])
         support[best] = 0.0
+
+
+def find_others(
+    views: Sequence[View], known: Sequence[Array], *, zone: Array, places: Array, wanted: Array
+) -> list[Stander]:
+    """Find who stands about places (n, 2) beside those who are known, states (35,): players, not ghosts between them.
+
+    Colours are those of a zone (2, 2); wanted: as `find_standers` takes it.
+    """
+    colours = ColourViews.of(views, zone)
+    for state in known:
+        colours = colours.without(state)
+    return [each for each in find_standers(colours, places, wanted) if each.support[0] > _LEAST_OF_SOMEBODY]
 
 
 def lies_in(zone: Array, floor_m: Array) -> bool:

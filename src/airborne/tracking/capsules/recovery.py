@@ -16,10 +16,9 @@ from scipy.special import logsumexp
 
 from airborne.tracking.capsules.dynamics import N_FREE, N_SLIDING
 from airborne.tracking.capsules.fit import JumperFit, JumperPrior, fit_jumper
-from airborne.tracking.capsules.floor_search import Stander, find_standers, floor_grid
+from airborne.tracking.capsules.floor_search import Stander, find_others, floor_grid
 from airborne.tracking.capsules.jumper import N_DOF
 from airborne.tracking.capsules.kernel_arguments import NOBODY
-from airborne.tracking.capsules.standing import ColourViews
 from airborne.tracking.capsules.track import Bystander, Track, evidence_per_px
 from airborne.tracking.capsules.unseen_legs import LEG_SD_RAD
 from airborne.tracking.capsules.views import map_evidence, player_regions
@@ -31,7 +30,6 @@ UNOCCLUDED = 0.05  # probability of a class to be occluded, of somebody of whom 
 _LOST_S, _EVERY_S = Fraction(1, 4), Fraction(1, 5)  # how long a player is lost before a look, and between looks
 _RARER = 4  # who is lost for long is looked for once in this share of the time: a look takes a second or two
 _FARTHEST_M = 4.0  # from where a player was lost, along and across
-_LEAST_SUPPORT = 1.1  # [nat m2] of somebody, see `tracking.first_pose.players`
 _MOST_POSES = 3  # of each that are tried
 # of a player's usual evidence, what is as likely another's, and its logistic scale; chosen on synthetic blocks 6100 to
 # 6102: players themselves have 0.65 or more, team-mates in the same dress 0.1 to 0.4 less, opponents less than zero
@@ -99,12 +97,7 @@ def find_again(lost: Mapping[str, Track], seen: Sequence[Array], frames: Frames)
 def _standers(frames: Frames, seen: Sequence[Array], zone: Array) -> list[Stander]:
     """Find who stands in a zone, without those who are seen."""
     views = [shrink(view) for view in frames.views if view is not None]
-    if len(views) < 2:
-        return []
-    colours = ColourViews.of(views, zone)
-    for state in seen:
-        colours = colours.without(state)
-    return [each for each in find_standers(colours, floor_grid(zone), zone) if each.support[0] > _LEAST_SUPPORT]
+    return find_others(views, seen, zone=zone, places=floor_grid(zone), wanted=zone) if len(views) > 1 else []
 
 
 def _bystanders(lost: Mapping[str, Track], zone: Array) -> tuple[Bystander, ...]:

@@ -16,6 +16,7 @@ from airborne.tracking.players import PlayerEstimate
 from airborne.types import Array
 from airborne.video import Frames
 
+# chosen by hand on synthetic blocks: blocker_variants.csv, and hidden_legs.csv for what is called tracked
 _LEAST_SHARE = 0.5  # of the reference evidence per pixel
 _UNCERTAIN_SD_M = 0.06  # above which a joint is uncertain
 SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # the constant lengths in a state

@@ -78,36 +78,36 @@ def class_image(state: Array, camera: Camera, thickness: float, others: Capsules
     return out
 
 
-def learn_colours(
-    regions: Sequence[PlayerRegion], images: Sequence[ClassImages], n_cameras: int, used: NDArray[np.bool_]
-) -> SurfaceColours:
-    """Learn from one player, drawn in each region: used (cameras, 5) masks which camera counts for which class.
-
-    A colour also counts, with less weight, brighter and darker: a surface rotates in the light, and one frame shows few
-    of its pixels. A colour that a class shares with the background, or with the class above or below it on the body,
-    goes to the one that has more of it.
-    """
-    return _learn(_count(regions, images), [region.view for region in regions], n_cameras, used)
-
-
-class _Counts(NamedTuple):
+class ColourCounts(NamedTuple):
     """How often regions show each colour."""
 
     classes: Array  # (regions, 5, 32768) on each class, brighter and darker too
     background: NDArray[np.float32]  # (regions, 32, 32, 32) around the player
 
 
-def _count(regions: Sequence[PlayerRegion], images: Sequence[ClassImages]) -> _Counts:
+def count_surfaces(regions: Sequence[PlayerRegion], images: Sequence[ClassImages]) -> ColourCounts:
+    """Count the colours of one player and around, drawn in each region.
+
+    A colour also counts, with less weight, brighter and darker: a surface rotates in the light, and one frame shows few
+    of its pixels.
+    """
     n, k, bins = len(regions), len(SURFACE_CLASSES), (BINS_PER_CHANNEL,) * 3
     counts, background = np.zeros((n, k, *bins), np.float32), np.zeros((n, *bins), np.float32)
     for region, (core, _, around), of_class, of_background in zip(regions, images, counts, background, strict=True):
         count_colours(region.rgb, around < 0, 1, of_background)
         for i, count in enumerate(of_class):
             count_colours(region.rgb, core == i, 1, count)
-    return _Counts(_augment_brightness(counts.reshape(n * k, *bins)).reshape(n, k, -1), background)
+    return ColourCounts(_augment_brightness(counts.reshape(n * k, *bins)).reshape(n, k, -1), background)
 
 
-def _learn(counts: _Counts, views: Sequence[int], n_cameras: int, used: NDArray[np.bool_]) -> SurfaceColours:
+def learn_colours(
+    counts: ColourCounts, views: Sequence[int], n_cameras: int, used: NDArray[np.bool_]
+) -> SurfaceColours:
+    """Learn from the counts of regions in some views: used (cameras, 5) masks which camera counts for which class.
+
+    A colour that a class shares with the background, or with the class above or below it on the body, goes to the one
+    that has more of it.
+    """
     background = np.zeros((n_cameras, *counts.background.shape[1:]), np.float32)
     background[views] = counts.background / np.maximum(counts.background.sum(axis=(1, 2, 3), keepdims=True), 1)
     raw = _normalise(np.einsum("vk,vkc->kc", used[views].astype(float), counts.classes))
@@ -171,16 +171,16 @@ def learn_unoccluded(state: Array, regions: Sequence[PlayerRegion], n_cameras: i
         )
         for region in regions
     ]
-    counts, views = _count(regions, images), [region.view for region in regions]
+    counts, views = count_surfaces(regions, images), [region.view for region in regions]
     if len(regions) > 2:
         for region, image in zip(regions, images, strict=True):
             elsewhere = used.copy()
             elsewhere[region.view] = False
-            colours = _learn(counts, views, n_cameras, elsewhere)
+            colours = learn_colours(counts, views, n_cameras, elsewhere)
             occlusion[region.view] = occlusion_chance(*_mean_evidence(image.whole, region, colours))
         agreeing = used & (occlusion < _AT_EVEN)
         used = np.where(agreeing.any(axis=0), agreeing, used)
-    return replace(_learn(counts, views, n_cameras, used), occlusion=occlusion)
+    return replace(learn_colours(counts, views, n_cameras, used), occlusion=occlusion)
 
 
 def occlusion_chance(evidence: Array, expected: Array) -> Array:

@@ -106,9 +106,10 @@ class Blocker:
             for name, track in state.players.items()
         }
         seen = [track.state for track in (*tracks.values(), *state.bystanders) if track.lost_s is None]
+        sighting = Sighting(frames, tuple(seen))
         for name, estimate in estimates.items():
             if estimate.joint_status[0] is Status.TRACKED:
-                tracks[name] = replace(tracks[name], sighting=Sighting(frames, tuple(seen)), bystanders=None)
+                tracks[name] = replace(tracks[name], sighting=sighting, bystanders=None)
         lost = {name: track for name, track in tracks.items() if track.lost_s is not None}
         if any(is_due(track, frames.time_s) for track in lost.values()):
             look = find_again(lost, seen, frames)

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.special import expit
 
 from airborne.errors import TrialError
-from airborne.tracking.capsules.bystanders import occluding_capsules
-from airborne.tracking.capsules.first_frame import FirstFrameFit, fit_first_frame, points_of
+from airborne.tracking.capsules.bystanders import LEAST_EVIDENCE, fit_stander
+from airborne.tracking.capsules.first_frame import FirstFrameFit, points_of
 from airborne.tracking.capsules.floor_search import (
     Stander,
     evaluate_grid,
@@ -40,7 +40,6 @@ _SUPPORT, _SUPPORT_SD = 0.95, 0.05
 _SHARE_PER_NAT = 0.01  # share of the support that makes a pose e times likelier
 _EVIDENCE_PER_NAT = 0.03  # the same of the fit's evidence; chosen on synthetic blocks 3101 to 3124
 _NET_NATS = 3.0  # for facing the net, of players near it
-_LEAST_EVIDENCE = 1.2  # [nat a pixel] of the fitted player
 # a logistic regression (Platt 1999) of whether the legs lie within 80 mm: nats of a constant, of the length of thigh
 # and shank [m], of how far the knees are straighter than a player's who waits [rad], of the fit's way from its stance
 # [m], of hips and knees that are not alike [rad], of what the evidence lacks of a player's who is well seen [nat a
@@ -49,7 +48,6 @@ _RIGHT_NATS = np.array([79.2, -75.2, -46.0, -77.1, -12.5, -9.4])
 _WAITING, _WELL_SEEN = 0.5, 1.8  # [rad] flexion of knees, [nat a pixel]; chosen on the same
 _HIPS, _KNEES = [8, 13], [11, 16]  # columns of a state: flexion
 _ALIKE_M = 0.06  # mean distance of the legs' joints, below which poses are the same
-_LOOSER = 3.0  # than joints set by hand
 _MOST_CANDIDATES, _LEAST_SHOWN = 8, 0.01  # number and share of those that are listed
 
 
@@ -79,7 +77,7 @@ class PlayersCandidate:
     @property
     def is_plausible(self) -> bool:
         """Whether there are any, and the pictures show each of them well."""
-        return bool(self.players) and all(player.evidence > _LEAST_EVIDENCE for player in self.players)
+        return bool(self.players) and all(player.evidence > LEAST_EVIDENCE for player in self.players)
 
     @property
     def starts(self) -> tuple[PlayerStart, ...]:
@@ -203,15 +201,10 @@ def _fit(standers: Sequence[Stander], others: Sequence[Array], frames: Frames) -
     for n in (1, None):  # first the likeliest stances, then all beside these
         for i, stander in enumerate(standers):
             beside = [*others, *states[:i], *states[i + 1 :]]
-            fits = [_fit_one(state, beside, frames) for state in stander.states[:n]]
+            fits = [fit_stander(state, beside, frames) for state in stander.states[:n]]
             found[i] = [_player_of(fit, stander, number) for number, fit in enumerate(fits)]
             states[i] = found[i][0].state
     return found
-
-
-def _fit_one(state: Array, others: Sequence[Array], frames: Frames) -> FirstFrameFit:
-    joints_m: dict[str, Array] = dict(zip(JOINTS, points_of(state), strict=True))
-    return fit_first_frame("found", joints_m, frames, occluding_capsules(state, others), looser=_LOOSER)
 
 
 def _player_of(fit: FirstFrameFit, stander: Stander, number: int) -> FoundPlayer:
