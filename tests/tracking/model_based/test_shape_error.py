@@ -33,7 +33,7 @@ def test_along_a_segments_own_axes_the_error_turns_with_it(frame):
     dofs, posed = all_joints(HUMAN), frame.render_model.with_pose(frame.truth)
     equations = linearise_images(frame.render_model, frame.truth, regions, frame.appearance, dofs=dofs)
     own = shape_gradients(equations, posed).reshape(len(posed.R), 3, -1)
-    by_world = np.einsum("sitp,tpd->sid", equations.patches[-1].reshape(len(own), 3, len(own), 6), equations.J)
+    by_world = np.einsum("sitp,tpd->sid", equations.shifted[-1].reshape(len(own), 3, len(own), 6), equations.J)
     np.testing.assert_allclose(np.einsum("sik,skd->sid", posed.R, own), by_world, atol=1e-9 * abs(by_world).max())
     assert abs(own - by_world).max() > 0.1 * abs(by_world).max()
 

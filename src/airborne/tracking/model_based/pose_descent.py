@@ -13,12 +13,15 @@ from airborne.geometry.descent import BacktrackingRule, descend
 from airborne.tracking.covariance import covariance_of
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.tracking.model_based.twist_equations import Sums, add_score_covariance, map_equations
+from airborne.tracking.model_based.twist_equations import Sums, add_score_covariance, map_equations, merge_blocks
 from airborne.types import Array
 
 _SHORTER = 0.4  # factor on a step that does not lower the objective
 _LEAST_SHARE = 0.1  # of a step: three losses; where none of them gains, the refitted light only fluctuates
 _SLACK = 1e-3  # of the objective: the refitted light makes it fluctuate
+# across a thing's image: about a face. No difference on synthetic throws; of a recorded plate's tilts 91 and 80 % lie
+# within two sds, with blocks of 16 px 86 and 74 %
+_PATCHES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +32,8 @@ class PoseEquations:
     A: Array  # (d, d)
     g: Array  # (d,)
     J: Array  # (segments, 6, d)
-    patches: Sequence[Array]  # (n, segments, 6) gradients that vary together: of blocks, of shifted images
+    blocks: Sequence[Array]  # (rows, columns, segments, 6) gradients, block by block of each image
+    shifted: Sequence[Array]  # (n, segments, 6) changes of the gradients by what a whole image has in common
     cost: float  # robust squared residual
     noise: float  # mean square of the weighted residual, times how many pixels share it
     misfit: float  # the same where the shape is wrong, too: a pose is weighed against its prior by this
@@ -37,9 +41,13 @@ class PoseEquations:
     noise_of_views: Sequence[float]  # `noise` of each image; none of masks
 
     def covariance(self) -> Array:
-        """Return the covariance (d, d) of the free degrees of freedom."""
-        score_covariance = np.zeros_like(self.A)
-        for each in self.patches:
+        """Return the covariance (d, d) of the free degrees of freedom.
+
+        Residuals vary together over a block, on a thing of flat faces in one light over a whole patch.
+        """
+        n_segments, score_covariance = len(self.J), np.zeros_like(self.A)
+        merged = [merge_blocks(each, _PATCHES) for each in self.blocks] if n_segments == 1 else self.blocks
+        for each in [each.reshape(-1, n_segments, 6) for each in merged] + list(self.shifted):
             add_score_covariance(np.ascontiguousarray(each), self.J, score_covariance)
         return covariance_of(self.A, noise=self.noise, score_covariance=score_covariance)
 
@@ -72,9 +80,8 @@ def map_to_dofs(
     map_equations(sums.A, sums.g, J, A, g)
     cost, total, weight = totals
     residual = total / weight if weight > 0 else 1.0
-    rows = [each.reshape(-1, *J.shape[:2]) for each in blocks] + list(shifted)
     noise, misfit = float(correlated * residual), float(shared * residual)
-    return PoseEquations(pose, A, g, J, rows, float(cost), noise, misfit, shared, noise_of_views)
+    return PoseEquations(pose, A, g, J, blocks, shifted, float(cost), noise, misfit, shared, noise_of_views)
 
 
 @dataclass(frozen=True, eq=False)

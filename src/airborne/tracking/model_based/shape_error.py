@@ -33,7 +33,7 @@ def shape_gradients(equations: PoseEquations, posed: PosedBody) -> Array:
     Along its own axes a segment's error is the same in every pose.
     """
     n = len(posed.R)
-    by_twist = equations.patches[-1].reshape(n, 3, n, 6)
+    by_twist = equations.shifted[-1].reshape(n, 3, n, 6)
     own = np.einsum("sik,sitp->sktp", posed.R, by_twist)
     return np.einsum("sktp,tpd->skd", own, equations.J).reshape(3 * n, -1)
 

@@ -35,6 +35,17 @@ def new_blocks(width: int, height: int, n_segments: int) -> np.ndarray:
     return np.zeros((height // BLOCK_PX + 1, width // BLOCK_PX + 1, n_segments, 6))
 
 
+def merge_blocks(blocks: np.ndarray, n: int) -> np.ndarray:
+    """Sum the blocks (rows, columns, s, 6) that hold any gradient into at most n by n patches: (k, m, s, 6)."""
+    for axis in (0, 1):
+        used = np.flatnonzero(np.any(blocks != 0, axis=(1 - axis, 2, 3)))
+        if len(used) == 0:
+            return blocks
+        first, end = used[0], used[-1] + 1
+        blocks = np.add.reduceat(blocks, np.arange(first, end, -(-(end - first) // n)), axis=axis)
+    return blocks
+
+
 @kernel(fastmath=True)
 def map_equations(A, g, jacobians, H, gradient):
     """Add the segments' equations, A (s, 6, 6) and g (s, 6), mapped by the jacobians (s, 6, d), to H (d, d) and (d,).
