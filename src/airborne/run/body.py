@@ -116,14 +116,17 @@ class BodyRun:
 
         An event says where they do not show it.
         """
-        model = sample_body_colours(self.model, self.start, first)
+        notes: list[str] = []
+        model = sample_body_colours(self.model, self.start, first, notes.append)
         seen = replace(self, model=model)
         if self.model.needs_colours:  # once more where the first frames show the body to be
             tracker = tracker_of(self.trial.settings, model, self.start)
             found = tracker.search(tracker.init(), first)
             if found.pose is not None:
-                seen = replace(self, model=sample_body_colours(self.model, found.pose, first))
+                notes.clear()
+                seen = replace(self, model=sample_body_colours(self.model, found.pose, first, notes.append))
                 seen = seen._fit_shape(first)
+        self.recording.events.extend(notes)
         if not is_seen(seen.model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
             self.recording.events.append(OUT_OF_SIGHT)
         return seen

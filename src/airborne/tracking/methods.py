@@ -108,8 +108,13 @@ def _search(settings: Settings) -> Search:
     return stepping_search([np.repeat(steps, 3) for steps in settings.loops], settings.v_rule)
 
 
-def sample_body_colours(model: BodyModel, start: Pose, frames: Frames) -> BodyModel:
-    """Give parts with `colour = "sample"` the colour that the first frames show at the first pose."""
+def sample_body_colours(
+    model: BodyModel, start: Pose, frames: Frames, note: Callable[[str], None] = lambda line: None
+) -> BodyModel:
+    """Give parts with `colour = "sample"` the colour that the first frames show at the first pose.
+
+    `note` is told which parts they do not show; see `with_sampled_colours`.
+    """
     if not model.needs_colours:
         return model
     posed, flat = model.with_pose(start), surface_arrays(model)
@@ -119,4 +124,4 @@ def sample_body_colours(model: BodyModel, start: Pose, frames: Frames) -> BodyMo
             part = render(flat, posed, view.camera, FLAT).part
             for index, pixels in enumerate(pixels_of_part):
                 pixels.append(view.rgb[part == index])
-    return with_sampled_colours(model, [np.concatenate(pixels) for pixels in pixels_of_part])
+    return with_sampled_colours(model, [np.concatenate(pixels) for pixels in pixels_of_part], note)

@@ -49,6 +49,12 @@ def test_colours_tell_a_pose_from_its_mirror_image(moments):
     assert told[0] > told[1] + 0.02
 
 
+def test_both_sides_and_a_face_and_the_hands_have_their_colours_in_common():
+    classes = dict(zip((part.name for part in HUMAN.parts), colour_classes(HUMAN).tolist(), strict=True))
+    assert classes["thigh_left_shorts"] == classes["thigh_right_shorts"] != classes["thigh_left_skin"]
+    assert classes["head_face"] == classes["hand_left"] == classes["hand_right"] != classes["head_hair"]
+
+
 def test_a_mirror_image_exchanges_left_and_right_where_they_are():
     straight = PoseSet(np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, HUMAN.n_joints, 3)))
     names = [landmark.name for landmark in HUMAN.landmarks]

@@ -62,6 +62,7 @@ def colour_classes(model: BodyModel) -> NDArray[np.int64]:
     for segment in model.segments:
         for part in segment.parts:
             kind = segment.name.removesuffix("_left").removesuffix("_right")
-            name = part.name.removesuffix("_left").removesuffix("_right")
-            names.append("skin" if kind in _SKIN or name in _SKIN else f"{kind} {name}")
+            name = part.name.replace("_left", "").replace("_right", "")
+            is_skin = kind in _SKIN or name.rpartition("_")[2] in _SKIN
+            names.append("skin" if is_skin else f"{kind} {name}")
     return np.unique(names, return_inverse=True)[1].astype(np.int64)
