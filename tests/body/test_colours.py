@@ -78,5 +78,5 @@ def test_part_of_which_neither_side_is_seen_has_the_colour_of_the_next_segment_t
     model = with_sampled_colours(LEGS, shown(10, None, None, None), notes.append)
     assert [part.colour[0] for part in model.parts] == [10, 10, 10, 10]
     assert len(notes) == 3
-    with pytest.raises(BodyError, match="part 'shorts' .* only 0 pixels show it"):
+    with pytest.raises(BodyError, match=r"part 'shorts' .* only 0 pixels show it"):
         with_sampled_colours(LEGS, shown(None, 20, 30, 40))
