@@ -62,6 +62,16 @@ def test_summary_of_a_free_fall_finds_gravity_rotations_and_a_constant_momentum(
     assert summary.to_dict()["fitted_gravity_m_s2"] == summary.fitted_gravity_m_s2
 
 
+def test_places_that_no_view_shows_leave_the_fall_of_the_others_as_it_is():
+    known = motion_of(MODEL, falling(), covariance=small_covariance(MODEL))
+    covariance = known.covariance.copy()
+    covariance[4:8, 2] = covariance[4:8, :, 2] = 0
+    covariance[4:8, 2, 2] = np.inf
+    table = measure_flight(replace(known, covariance=covariance), MODEL)
+    assert not np.isfinite(table["com_sd"][4:8, 2]).any()
+    np.testing.assert_allclose(table["com"], measure_flight(known, MODEL)["com"], atol=EXACT)
+
+
 def test_a_body_that_does_not_fall_freely_is_detected_by_its_gravity_and_its_distance_from_free_fall():
     summary = summarise(motion_of(MODEL, falling(gravity=8.0)))
     assert summary.fitted_gravity_m_s2 == pytest.approx(8.0, abs=ROUNDTRIP)

@@ -137,7 +137,8 @@ def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
 def _as_it_falls(motion: Motion, com: Array, variance: Array) -> tuple[Array, Array]:
     """Return the centre of mass and its variances (n, 3), moved to where it falls best; as given without a fall."""
     posed = np.flatnonzero(motion.has_pose)
-    height, stated = com[posed, 2], np.nan_to_num(variance[posed, 2], nan=UNKNOWN_SD_M**2)
+    height, stated = com[posed, 2], variance[posed, 2]
+    stated = np.where(np.isfinite(stated), stated, UNKNOWN_SD_M**2)
     rows = posed[flight_rows(motion.time_s[posed], height, stated)] if len(posed) > 1 else posed[:0]
     if not len(rows):
         return com, variance
