@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body.chain import clamp_to_limits, joint_angles_of
+from airborne.body.crossing import are_crossed
 from airborne.tracking.model_based import gauss_newton
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter
@@ -106,6 +107,17 @@ def test_legs_taken_for_each_other_are_exchanged_where_the_trunk_is_twisted(fram
     wrong = twist_trunk(turn_pelvis_back(HUMAN, frame.truth)[number], frame.truth)
     assert not is_twisted(HUMAN, frame.truth)
     assert is_twisted(HUMAN, wrong)
+    held, judged = judge_held(frame, fitter, wrong)
+    assert frame.off_mm(held.pose, LEGS) > 100
+    assert frame.off_mm(judged.fit.pose, LEGS) < 20
+
+
+@pytest.mark.parametrize("number", [1, 3])  # turned by 130 and by 70 degrees
+def test_crossed_legs_are_exchanged(frame, fitter, number):
+    wrong = clamp_to_limits(HUMAN, turn_pelvis_back(HUMAN, frame.truth)[number])
+    assert not are_crossed(HUMAN, HUMAN.with_pose(frame.truth).t)
+    assert are_crossed(HUMAN, HUMAN.with_pose(wrong).t)
+    assert not is_twisted(HUMAN, wrong)
     held, judged = judge_held(frame, fitter, wrong)
     assert frame.off_mm(held.pose, LEGS) > 100
     assert frame.off_mm(judged.fit.pose, LEGS) < 20

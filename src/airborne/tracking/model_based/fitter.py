@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
+from airborne.tracking.model_based import turned_pelvis
 from airborne.tracking.model_based.degrees_of_freedom import (
     DegreesOfFreedom,
     PosePrior,
@@ -41,7 +42,6 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
-from airborne.tracking.model_based.turned_pelvis import find_turned_pelvis, is_twisted, turn_pelvis_back, turned_columns
 from airborne.tracking.model_based.uncovered import find_uncovered
 from airborne.types import Array
 
@@ -159,10 +159,10 @@ class Fitter:
 
         The images alone do not tell an uncovered limb from one of a slightly different shade: both residuals are
         beyond what counts. So the mask's evidence counts too, a patch of pixels as one. A trunk that is twisted to its
-        limits is as unlikely as a lost limb.
+        limits, or crossed legs, are as unlikely as a lost limb.
         """
         of_mask = self.agreement(fit.equations.pose, learned).evidence / fit.equations.shared
-        return fit.objective(misfit, prior) - of_mask + self._twist_nats(fit.pose)
+        return fit.objective(misfit, prior) - of_mask + self._improbable_nats(fit.pose)
 
     def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
         bodies = [self.render_model.with_pose(pose) for pose in poses]
@@ -190,7 +190,7 @@ class Fitter:
             return faults, prior
 
         faults = self._find_faults(fit, learned)
-        if faults.misplaced or faults.beside or is_twisted(self.model, fit.pose):
+        if faults.misplaced or faults.beside or turned_pelvis.is_improbable(self.model, fit.pose):
             refitted, prior = self._refit_body(fit, learned, prior)
             faults = faults if refitted is fit else self._find_faults(refitted, learned)
             for limb in faults.misplaced:
@@ -204,15 +204,16 @@ class Fitter:
         return faults
 
     def _refit_body(self, fit: Fit, learned: LearnedRegions, prior: PosePrior | None) -> tuple[Fit, PosePrior | None]:
-        """Fit everything again, freer of what was expected, and a twisted trunk from where it may have come from."""
+        """Fit everything again, freer of what was expected, and an improbable pose from where it may have come from."""
         if prior is None:
             return fit, prior
         loose = prior.loosen()
-        starts = [fit.pose, *find_turned_pelvis(self.render_model, fit.pose, learned.evidence)]
+        starts = [fit.pose, *turned_pelvis.find_turned_pelvis(self.render_model, fit.pose, learned.evidence)]
         fit, prior = self._refit_from(starts, fit, learned, prior=prior, widened=loose)
-        if not is_twisted(self.model, fit.pose):
+        if not turned_pelvis.is_improbable(self.model, fit.pose):
             return fit, prior
-        back, free = turn_pelvis_back(self.model, fit.pose), loose.widen(turned_columns(self.model))
+        back = turned_pelvis.turn_pelvis_back(self.model, fit.pose)
+        free = loose.widen(turned_pelvis.turned_columns(self.model))
         return self._refit_from(back, fit, learned, prior=prior, widened=free, n_lost=2)
 
     def _refit_from(
@@ -229,15 +230,15 @@ class Fitter:
         poses = [self.fit_silhouettes(start, learned, NEAR, widened) for start in starts]
 
         def mask_nats(pose: Pose) -> float:
-            return self.agreement(pose, learned).evidence / fit.equations.shared - self._twist_nats(pose)
+            return self.agreement(pose, learned).evidence / fit.equations.shared - self._improbable_nats(pose)
 
         least = mask_nats(fit.pose) + _RISEN_NATS
         fits = [self.fit_images([pose], learned, widened) for pose in poses if mask_nats(pose) > least]
         return self._best_place(fit, fits, learned, prior=prior, widened=widened, n_lost=n_lost)
 
-    def _twist_nats(self, pose: Pose) -> float:
-        """Return what a twisted trunk costs [nat]."""
-        return LOST_NATS * (self.moves_joints and is_twisted(self.model, pose))
+    def _improbable_nats(self, pose: Pose) -> float:
+        """Return what a pose costs that people hardly ever are in [nat]."""
+        return LOST_NATS * (self.moves_joints and turned_pelvis.is_improbable(self.model, pose))
 
     def _refit_limb(
         self,

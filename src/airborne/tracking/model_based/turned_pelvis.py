@@ -1,6 +1,7 @@
 """A pelvis that is turned alone: it is almost as deep as wide, so that little but the roots of the legs shows it.
 
-Where it is turned so far that the trunk is twisted to its limits, the legs have often been taken for each other, too.
+Where it is turned so far that the trunk is twisted to its limits, or the legs are crossed, these have often been taken
+for each other, too.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import joint_angles_of
+from airborne.body.crossing import are_crossed
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.rendering import EvidenceMaps, mask_evidence
 from airborne.tracking.model_based.degrees_of_freedom import joints_of, limb_of_segment, limbs_of
@@ -37,7 +39,7 @@ def find_turned_pelvis(render_model: RenderModel, pose: Pose, maps: EvidenceMaps
     bodies = [render_model.with_pose(each) for each in poses]
     R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
     evidence = mask_evidence(render_model.geometry, maps, R, t).sum(axis=1)
-    if is_twisted(render_model.model, pose):
+    if is_improbable(render_model.model, pose):
         evidence[0] = -np.inf
     best = int(np.argmax(evidence))
     return [poses[best]] if best else []
@@ -51,8 +53,19 @@ def turn_pelvis_back(model: BodyModel, pose: Pose) -> list[Pose]:
 def turned_columns(model: BodyModel) -> NDArray[np.int64]:
     """Return the degrees of freedom that turning the pelvis changes: the root's rotation, trunk and limbs on it."""
     segments = np.flatnonzero(limb_of_segment(model) < 0)[1:]
-    limbs = [limb for limb in limbs_of(model) if model.parents[limb[0]] == 0]
-    return np.concatenate([np.arange(3, 6), joints_of(model, np.concatenate([segments, *limbs])).columns])
+    return np.concatenate(
+        [np.arange(3, 6), joints_of(model, np.concatenate([segments, *limbs_on_root(model)])).columns]
+    )
+
+
+def is_improbable(model: BodyModel, pose: Pose) -> bool:
+    """Whether people hardly ever are in a pose: the trunk twisted to its limits, or the legs crossed."""
+    return is_twisted(model, pose) or bool(are_crossed(model, model.with_pose(pose).t))
+
+
+def limbs_on_root(model: BodyModel) -> list[NDArray[np.int64]]:
+    """Return the segments of each limb that hangs on the root."""
+    return [limb for limb in limbs_of(model) if model.parents[limb[0]] == 0]
 
 
 def is_twisted(model: BodyModel, pose: Pose) -> bool:
@@ -63,7 +76,7 @@ def is_twisted(model: BodyModel, pose: Pose) -> bool:
 
 def _turn(model: BodyModel, pose: Pose, angle: float, source: NDArray[np.int64]) -> Pose:
     """Turn the root; its limbs take the rotations and aims of those of the segments `source` (segments,)."""
-    body, on_root = model.with_pose(pose), [limb for limb in limbs_of(model) if model.parents[limb[0]] == 0]
+    body, on_root = model.with_pose(pose), limbs_on_root(model)
     R, t = body.R.copy(), body.t.copy()
     for limb in on_root:
         R[limb], t[limb] = body.R[source[limb]], body.t[source[limb]]
