@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body.chain import clamp_to_limits, joint_angles_of
-from airborne.body.crossing import are_crossed
+from airborne.body.sides import are_crossed
 from airborne.tracking.model_based import gauss_newton
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.model import BodyModel
+from airborne.body.sides import other_side
 from airborne.errors import BodyError
 from airborne.types import Array
 
 FEWEST_PX = 20  # fewer pixels than this say nothing of a part's colour
-_SIDES = {"left": "right", "right": "left"}
 
 
 def with_sampled_colours(
@@ -48,7 +48,7 @@ def with_sampled_colours(
 def _kin(model: BodyModel, index: int) -> Iterator[int]:
     """Yield the parts whose colour a part most likely has: that of its other side, then those toward the root."""
     names = [part.name for part in model.parts]
-    other = "_".join(_SIDES.get(word, word) for word in names[index].split("_"))
+    other = other_side(names[index])
     if other != names[index] and other in names:
         yield names.index(other)
     segments: Sequence[int] = [k for k, segment in enumerate(model.segments) for _ in segment.parts]

@@ -25,6 +25,7 @@ from airborne.body.landmark_fit import (
 )
 from airborne.body.model import BodyModel, Pose
 from airborne.body.shaping import with_segment_lengths
+from airborne.body.sides import other_side
 from airborne.errors import BodyError
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.types import Array
@@ -291,9 +292,3 @@ def _variables(model: BodyModel, segments: Iterable[int], *, root: bool = True) 
     for index in segments:
         free[3 + 3 * index : 6 + 3 * index] = True
     return free
-
-
-def other_side(name: str) -> str:
-    """Return the name of a landmark or segment on the other side; its own where it has no side."""
-    stem, _, side = name.rpartition("_")
-    return {"left": f"{stem}_right", "right": f"{stem}_left"}.get(side, name)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from airborne.body import BodyModel, Landmark, Pose
-from airborne.body.inverse_kinematics import other_side
+from airborne.body.sides import other_side
 from airborne.body_fitting.fit import JOINT_SD_M
 from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.types import Array

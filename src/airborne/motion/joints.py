@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.body.chain import nearest_angles, point_jacobian
-from airborne.body.crossing import are_crossed, paired_legs
 from airborne.body.shaping import half_widths_m
+from airborne.body.sides import are_crossed, paired_legs
 from airborne.errors import ResultError
 from airborne.geometry.rotations import (
     angles_from_matrix,
@@ -126,7 +126,7 @@ def _may_swap(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     crossed[rows] = are_crossed(
         model, model.pose_segments(motion.R[rows], motion.position[rows], motion.joint_angles[rows])[1]
     )
-    of_legs = np.isin(owners, [segment for pair in paired_legs(model) for leg in pair for segment in leg])
+    of_legs = np.isin(owners, [segment for legs in paired_legs(model) for segment in legs.ravel()])
     return (crossed & (motion.n_views < _SURE_VIEWS))[:, None] & of_legs
 
 

@@ -9,20 +9,17 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import clamp_to_limits, joint_angles_of
+from airborne.body.sides import paired_limbs
 from airborne.types import Array
 
-_LEFT, _RIGHT = "_left", "_right"
 _LIKELIER_M = 0.05  # mean distance of the limbs' joints by which a swapped pose must be nearer
 
 
 def swap_limbs(model: BodyModel, pose: Pose) -> list[Pose]:
-    """Return the pose with each pair of limbs swapped: every segment takes its counterpart's orientation.
-
-    A pair is what hangs on the trunk by segments named `<name>_left` and `<name>_right`.
-    """
+    """Return the pose with each pair of limbs swapped: every segment takes its counterpart's orientation."""
     R = model.with_pose(pose).R
     poses = []
-    for limb in _limbs(model):
+    for limb in paired_limbs(model):
         R_swapped = R.copy()
         left, right = [i for i, _ in limb], [j for _, j in limb]
         R_swapped[left], R_swapped[right] = R[right], R[left]
@@ -34,7 +31,7 @@ def swap_limbs(model: BodyModel, pose: Pose) -> list[Pose]:
 def counterparts(model: BodyModel) -> NDArray[np.int64]:
     """Return for every segment its counterpart on the other side, or itself: (segments,)."""
     other = np.arange(len(model.segments))
-    for limb in _limbs(model):
+    for limb in paired_limbs(model):
         for left, right in limb:
             other[left], other[right] = right, left
     return other
@@ -48,20 +45,6 @@ def is_nearer(model: BodyModel, pose: Pose, other: Pose, expected: Pose) -> bool
         return False
     away, other_away = (np.linalg.norm((each - middle)[moved], axis=1).mean() for each in (here, there))
     return bool(away < other_away - _LIKELIER_M)
-
-
-def _limbs(model: BodyModel) -> list[list[tuple[int, int]]]:
-    """Return for every pair of limbs the indices of its segments, left and right."""
-    names = [segment.name for segment in model.segments]
-    limbs: dict[int, list[tuple[int, int]]] = {}
-    root_of: dict[int, int] = {}
-    for left, name in enumerate(names):
-        counterpart = name.removesuffix(_LEFT) + _RIGHT
-        if not name.endswith(_LEFT) or counterpart not in names:
-            continue
-        root_of[left] = root_of.get(int(model.parents[left]), left)
-        limbs.setdefault(root_of[left], []).append((left, names.index(counterpart)))
-    return list(limbs.values())
 
 
 def _mirror_angles(angles: Array, limb: list[tuple[int, int]]) -> Array:

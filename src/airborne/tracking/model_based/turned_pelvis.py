@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import joint_angles_of
-from airborne.body.crossing import are_crossed
+from airborne.body.sides import are_crossed
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.rendering import EvidenceMaps, mask_evidence
 from airborne.tracking.model_based.degrees_of_freedom import joints_of, limb_of_segment, limbs_of

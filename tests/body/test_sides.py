@@ -1,4 +1,4 @@
-"""Crossed legs, told from where the joints are."""
+"""Left and right, and crossed legs, told from where the joints are."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose
-from airborne.body.crossing import are_crossed, paired_legs
+from airborne.body.sides import are_crossed, other_side, paired_legs, paired_limbs
 from airborne.motion import landmarks
 from airborne.motion.joints import joint_statuses
 from tests.support.motions import motion_of
@@ -45,7 +45,7 @@ def test_many_frames_are_told_as_each_of_them_is():
 
 def test_a_body_without_legs_has_none_to_cross():
     trunk = BodyModel("trunk", HUMAN.segments[:3])
-    assert paired_legs(trunk) == []
+    assert not paired_legs(trunk)
     assert not are_crossed(trunk, np.zeros((4, 3, 3))).any()
 
 
@@ -61,3 +61,17 @@ def test_crossed_legs_are_uncertain_where_only_two_cameras_show_them(n_views, st
     for name in ("hip_left", "knee_right", "ankle_left"):
         assert statuses[1, names.index(name)] == status
     assert statuses[1, names.index("wrist_left")] == "tracked"
+
+
+def test_the_other_side_of_the_other_side_is_the_name_itself():
+    assert other_side("thigh_left_skin") == "thigh_right_skin"
+    assert other_side("head") == "head"
+    for name in (landmark.name for landmark in HUMAN.landmarks):
+        assert other_side(other_side(name)) == name
+
+
+def test_pairs_of_limbs_are_of_both_sides_from_the_trunk_on():
+    for limb in paired_limbs(HUMAN):
+        assert HUMAN.parents[limb[0][0]] == HUMAN.parents[limb[0][1]]
+        for left, right in limb:
+            assert other_side(HUMAN.segments[left].name) == HUMAN.segments[right].name
