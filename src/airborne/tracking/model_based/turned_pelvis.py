@@ -34,7 +34,7 @@ def turn_pelvis(model: BodyModel, pose: Pose) -> list[Pose]:
 
 
 def find_turned_pelvis(render_model: RenderModel, pose: Pose, maps: EvidenceMaps) -> list[Pose]:
-    """Return the pose with its pelvis turned, if that has more evidence on the reduced images, or it is twisted."""
+    """Return the pose with its pelvis turned, if that has more evidence on reduced images or the pose is improbable."""
     poses = [pose, *turn_pelvis(render_model.model, pose)]
     bodies = [render_model.with_pose(each) for each in poses]
     R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
