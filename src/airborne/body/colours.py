@@ -28,20 +28,17 @@ def with_sampled_colours(
     for part, pixels in zip(model.parts, pixels_of_parts, strict=True):
         sampled = np.median(pixels, axis=0) if len(pixels) >= FEWEST_PX else None
         seen.append(sampled if part.colour is None else part.colour)
-    colours = []
-    for index, (part, pixels) in enumerate(zip(model.parts, pixels_of_parts, strict=True)):
-        if seen[index] is None:
-            where = f"only {len(pixels)} pixels show it at the first pose (at least {FEWEST_PX} needed)"
-            donor = next((each for each in _kin(model, index) if seen[each] is not None), None)
-            if donor is None:
-                raise BodyError(
-                    f"part '{part.name}' asks for colour = \"sample\", but {where}; correct the start pose or give "
-                    "colour_srgb"
-                )
-            note(f"body: part '{part.name}' has the colour of '{model.parts[donor].name}', as {where}")
-            colours.append(seen[donor])
-        else:
-            colours.append(seen[index])
+    colours = list(seen)
+    for index in (k for k, colour in enumerate(seen) if colour is None):
+        name, n = model.parts[index].name, len(pixels_of_parts[index])
+        where = f"only {n} pixels show it at the first pose (at least {FEWEST_PX} needed)"
+        donor = next((each for each in _kin(model, index) if seen[each] is not None), None)
+        if donor is None:
+            raise BodyError(
+                f"part '{name}' asks for colour = \"sample\", but {where}; correct the start pose or give colour_srgb"
+            )
+        note(f"body: part '{name}' has the colour of '{model.parts[donor].name}', as {where}")
+        colours[index] = seen[donor]
     return model.with_colours(np.array(colours))
 
 

@@ -13,13 +13,19 @@ from airborne.types import Array
 _OTHER = {"left": "right", "right": "left"}
 _LEFT, _RIGHT = "_left", "_right"  # how the names of a pair's segments end
 # cosine from the line across the hips to that across the knees: of legs that two cameras of ten synthetic people showed
-# farther aslant, 69 % were over 0.1 m off, and 57 % of those whose ankles lay on the other side; of all legs 17 %
+# farther aslant, with a body a tenth too tall, 69 % were over 0.1 m off, and 57 % of those with the ankles
+# exchanged; of all legs 17 %
 _ASLANT = 0.5
 
 
 def other_side(name: str) -> str:
     """Return the name of a landmark, part or segment on the other side; its own where it has no side."""
     return "_".join(_OTHER.get(word, word) for word in name.split("_"))
+
+
+def without_side(name: str) -> str:
+    """Return a name without its side."""
+    return "_".join(word for word in name.split("_") if word not in _OTHER)
 
 
 def paired_limbs(model: BodyModel) -> list[list[tuple[int, int]]]:

@@ -35,7 +35,9 @@ UNCERTAIN_SD_M = 0.05  # of a landmark; the same as of a whole body
 # synthetic people, lengths 4 % and girths 12 % off
 PLACE_SHARE = 0.05
 _STRAINED_RAD, _STRAINED_FRAMES = np.radians(3.0), 3  # beyond a limit by more than its sd, in so many frames on end
-_SURE_VIEWS = 3  # of synthetic people's tracked legs, 16 % are over 0.1 m off with two cameras, with three hardly any
+# of synthetic people's tracked legs, with a body a tenth too tall, 16 % are over 0.1 m off with two cameras, with three
+# hardly any
+_SURE_VIEWS = 3
 
 
 class JointStatus(StrEnum):
@@ -121,13 +123,11 @@ def _is_strained(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
 
 def _may_swap(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     """Say which landmarks are of legs that few cameras show crossed: they may be each other's (n, landmarks)."""
-    owners, rows = [model.index_of(landmark.segment) for landmark in model.landmarks], np.flatnonzero(motion.has_pose)
-    crossed = np.zeros(len(motion), np.bool_)
-    crossed[rows] = are_crossed(
-        model, model.pose_segments(motion.R[rows], motion.position[rows], motion.joint_angles[rows])[1]
-    )
-    of_legs = np.isin(owners, [segment for legs in paired_legs(model) for segment in legs.ravel()])
-    return (crossed & (motion.n_views < _SURE_VIEWS))[:, None] & of_legs
+    rows, crossed = np.flatnonzero(motion.has_pose & (motion.n_views < _SURE_VIEWS)), np.zeros(len(motion), np.bool_)
+    joints_m = model.pose_segments(motion.R[rows], motion.position[rows], motion.joint_angles[rows])[1]
+    crossed[rows] = are_crossed(model, joints_m)
+    owners = [model.index_of(landmark.segment) for landmark in model.landmarks]
+    return crossed[:, None] & np.isin(owners, [segment for legs in paired_legs(model) for segment in legs.ravel()])
 
 
 def continuous_angles(motion: Motion) -> Array:

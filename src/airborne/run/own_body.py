@@ -14,6 +14,7 @@ from airborne.body import BodyModel, Pose, surface_arrays
 from airborne.body.files import write_body
 from airborne.body.inverse_kinematics import CORE
 from airborne.body.shaping import with_segment_lengths
+from airborne.body.sides import without_side
 from airborne.body_fitting.checks import (
     check_joints,
     check_lengths,
@@ -131,8 +132,7 @@ def describe_fit(person: PersonFit) -> str:
     colours: dict[str, str] = {}
     for part in fit.model.parts:
         if part.colour is not None:
-            name = part.name.replace("_left", "").replace("_right", "")
-            colours[name] = " ".join(f"{value:.0f}" for value in part.colour)
+            colours[without_side(part.name)] = " ".join(f"{value:.0f}" for value in part.colour)
     lines.append("sRGB: " + "; ".join(f"{name} {colour}" for name, colour in colours.items()))
     before, after = fit.rms_light
     lines.append(f"residual: {before * 255:.2f} to {after * 255:.2f} (linear light, 0 to 255)")

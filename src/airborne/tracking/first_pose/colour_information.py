@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 
 from airborne.appearance.pixel_features import colour_features
 from airborne.body import BodyModel, PosedBody
+from airborne.body.sides import without_side
 from airborne.cameras import Camera
 from airborne.tracking.first_pose.person import SilhouetteEvidence
 from airborne.tracking.model_based.render_model import RenderModel
@@ -61,8 +62,7 @@ def colour_classes(model: BodyModel) -> NDArray[np.int64]:
     names = []
     for segment in model.segments:
         for part in segment.parts:
-            kind = segment.name.removesuffix("_left").removesuffix("_right")
-            name = part.name.replace("_left", "").replace("_right", "")
+            kind, name = without_side(segment.name), without_side(part.name)
             is_skin = kind in _SKIN or name.rpartition("_")[2] in _SKIN
             names.append("skin" if is_skin else f"{kind} {name}")
     return np.unique(names, return_inverse=True)[1].astype(np.int64)

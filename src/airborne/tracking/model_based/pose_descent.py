@@ -43,7 +43,7 @@ class PoseEquations:
     def covariance(self) -> Array:
         """Return the covariance (d, d) of the free degrees of freedom.
 
-        Residuals vary together over a block, on a thing of flat faces in one light over a whole patch.
+        Residuals vary together over a block, on a thing over a patch: about a face.
         """
         n_segments, score_covariance = len(self.J), np.zeros_like(self.A)
         merged = [merge_blocks(each, _PATCHES) for each in self.blocks] if n_segments == 1 else self.blocks

@@ -53,9 +53,8 @@ def turn_pelvis_back(model: BodyModel, pose: Pose) -> list[Pose]:
 def turned_columns(model: BodyModel) -> NDArray[np.int64]:
     """Return the degrees of freedom that turning the pelvis changes: the root's rotation, trunk and limbs on it."""
     segments = np.flatnonzero(limb_of_segment(model) < 0)[1:]
-    return np.concatenate(
-        [np.arange(3, 6), joints_of(model, np.concatenate([segments, *limbs_on_root(model)])).columns]
-    )
+    freed = joints_of(model, np.concatenate([segments, *limbs_on_root(model)]))
+    return np.concatenate([np.arange(3, 6), freed.columns])
 
 
 def is_improbable(model: BodyModel, pose: Pose) -> bool:
