@@ -59,9 +59,10 @@ def searched(monkeypatch, views: dict[int, list[bool]] | None = None) -> set[int
     search = RefinedTracker.search
 
     def noted(self, state, observed):
-        frames.add(observed.index)
+        index = abs(observed.index)  # it is counted backward in a backward pass
+        frames.add(index)
         if views is not None:
-            views[observed.index] = [view is not None for view in observed.views]
+            views[index] = [view is not None for view in observed.views]
         return search(self, state, observed)
 
     monkeypatch.setattr(RefinedTracker, "search", noted)

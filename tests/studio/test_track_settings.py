@@ -5,6 +5,7 @@ import shutil
 from airborne.io.text import read_toml
 from airborne.trial.settings import PLAYERS_METHODS
 from tests.support.browser import open_page
+from tests.support.example_trial import edit_trial
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import write_run, write_trial
 from tests.support.studio import fork_studio, wait_for_frame
@@ -74,3 +75,23 @@ def test_a_page_goes_on_once_what_comes_first_is_done(tmp_path):
         assert "is not a number" in page.locator(".rail .says").nth(1).get_attribute("title")
         points.write_text(text)
         page.get_by_label("last frame").wait_for()
+        first = page.get_by_label("first frame")
+        first.fill("1")
+        first.press("Enter")
+        page.get_by_text("the first pose is that of frame 0; give a first frame up to there").wait_for()
+
+
+def test_frames_before_the_first_pose_are_asked_for_and_taken_back(tmp_path):
+    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    trial = edit_trial(folder / "trial.toml", "trial.toml", ("frame = 0", "frame = 20"))
+    with fork_studio(trial) as address, open_page(address.replace("/?", "/track?")) as page:
+        first = page.get_by_label("first frame")
+        first.fill("5")
+        first.press("Enter")
+        page.get_by_text("from frame 20, the first pose's, on and back").wait_for()
+        assert read_toml(trial)["track"] == {"method": "refined", "start": 5}
+        first.fill("")
+        first.press("Enter")
+        page.get_by_text("from frame 20, the first pose's", exact=True).wait_for()
+        assert first.input_value() == "20"
+    assert read_toml(trial)["track"] == {"method": "refined"}

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from airborne.body.chain import delta_between
 from airborne.tracking import Status
-from airborne.tracking.both_directions import track_between_keys, turn_time
+from airborne.tracking.backward import turn_time
+from airborne.tracking.both_directions import track_between_keys
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.predictors import correct_past, linear, turn_past
@@ -41,7 +42,7 @@ class Searches:
         self.init, self.learn, self.turn, self.weigh = tracker.init, tracker.learn, tracker.turn, tracker.weigh
 
     def search(self, state, frames):
-        self.frames.append(frames.index)
+        self.frames.append(abs(frames.index))  # counted backward in the backward pass
         return self.tracker.search(state, frames)
 
 
@@ -126,9 +127,9 @@ def test_time_turned_twice_is_as_it_was(scene):
     frames = scene.frames(2)
     late = replace(frames, views=tuple(replace(view, delay_s=0.004) for view in frames.views))
     turned = turn_time(late)
-    assert (turned.time_s, turned.views[0].delay_s) == (-late.time_s, -0.004)
+    assert (turned.index, turned.time_s, turned.views[0].delay_s) == (-2, -late.time_s, -0.004)
     again = turn_time(turned)
-    assert again.time_s == late.time_s
+    assert (again.index, again.time_s) == (2, late.time_s)
     assert again.views[0].delay_s == 0.004
 
 

@@ -58,3 +58,10 @@ def test_a_dark_image_with_a_bright_corner_is_not_dark():
     assert is_dark(shown)
     shown.rgb[-4:, -4:] = 200
     assert not is_dark(shown)
+
+
+def test_frames_before_the_start_come_last_and_are_listed_upward():
+    outages = Outages(("left",))
+    for k in (4, 5, 3, 2, 1):
+        outages.add(Frames(k, Fraction(k, 50), (view(90) if k == 4 else None,)))
+    assert list(outages.describe()) == ["left: no image at 4 of 5 frames: frames 5, 1 to 3"]

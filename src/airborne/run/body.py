@@ -38,6 +38,7 @@ from airborne.motion.run_folder import (
     videos_of,
 )
 from airborne.motion.tables import write_uncertainty
+from airborne.run.body_passes import BodyPasses
 from airborne.run.body_tables import write_tables
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart
@@ -47,11 +48,9 @@ from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.run.whole_run import FittedRun, fit_whole_run
 from airborne.tracking import Estimate
-from airborne.tracking.both_directions import track_between_keys
 from airborne.tracking.estimate import Status, unknown_segments
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import sample_body_colours, tracker_of
-from airborne.tracking.revision import track_with_revision
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
@@ -93,6 +92,11 @@ class BodyRun:
         keys, missed = keys_of_frames(trial, model, opened.recording)
         opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *missed])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first.points)
+
+    @property
+    def n_frames(self) -> int | None:
+        """How many times to expect by the files' stated durations; None where they are unknown."""
+        return replace(self.recording, start=self.trial.first_frame).n_frames
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -166,21 +170,10 @@ class BodyRun:
         done: Mapping[int, Estimate],
         tick: Callable[[int], None],
     ) -> Iterator[tuple[Frames, Estimate]]:
-        """Yield each time's frames with the body's estimate there, written; between keys it is tracked both ways.
-
-        Without keys, limbs that were found again are followed back from there.
-        """
-        tracker = tracker_of(self.trial.settings, self.model, self.start, self.keys)
-        if self.trial.directions == "forward" or not (self.keys or tracker.revises):
-            return track_frames(tracker, frames, write, done)
-        if not self.keys:
-            return track_with_revision(tracker, frames, write, done, tick=tick)
-        recording = self.recording
-        frames_to_track = range(recording.start, max(self.keys) + 1, recording.every)
-        reader, keys = Rereading(recording), list(self.keys)
-        return track_between_keys(
-            tracker, self.model, reader, frames_to_track, keys=keys, write=write, done=done, tick=tick
-        )
+        """Yield each time's frames with the body's estimate there, written: from the start on, then back from it."""
+        passes = BodyPasses(self.trial, self.recording, self.model, self.start, self.keys)
+        yield from passes.track(frames, write, done, tick)
+        yield from passes.track_earlier(write, done)
 
     def writer(self, folder: Path, *, resume: bool) -> MotionWriter:
         """Return what writes the estimates."""
@@ -192,8 +185,8 @@ class BodyRun:
         writer.append(estimate)
 
     def artists(self, folder: Path, drawn: OverlaysAs) -> Iterable[AbstractContextManager[Any]]:
-        """Return what draws the frames while they are tracked; nothing where poses change at the end of the run."""
-        return () if drawn == "videos" and self._fits_whole_run else self._all_artists(folder, drawn)
+        """Return what draws the frames while they are tracked; nothing where they are drawn at the end of the run."""
+        return () if drawn == "videos" and self._is_drawn_at_end else self._all_artists(folder, drawn)
 
     def _all_artists(self, folder: Path, drawn: OverlaysAs) -> Iterator[AbstractContextManager[Any]]:
         from airborne.export.matching import MatchingPicture
@@ -224,6 +217,11 @@ class BodyRun:
         settings = self.trial.track
         return isinstance(settings, BodySettings) and settings.fits_whole_run and self.model.has_joints
 
+    @property
+    def _is_drawn_at_end(self) -> bool:
+        """Whether poses change at the end of the run, or frames are not tracked in the order of time."""
+        return self._fits_whole_run or self.trial.first_frame < self.trial.start.frame
+
     def finish(
         self, folder: Path, drawn: OverlaysAs | None, progress_of: Callable[[str], Progress | None]
     ) -> tuple[Motion, dict[str, Any]]:
@@ -248,7 +246,7 @@ class BodyRun:
         if checked.found is not None:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
         flight = write_tables(folder, motion, model)
-        if drawn == "videos" and self._fits_whole_run:
+        if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, progress_of("drawing"))
         self.recording.events.extend(checked.doubts)
         is_exact = self.calibration is None

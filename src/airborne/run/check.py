@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -112,7 +113,7 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
 
 def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> None:
     """Find the start in good files, and look whether there are frames to track."""
-    opened = checks.attempt(lambda: open_trial(trial, facts), lambda opened: f"frames: {_describe_frames(opened)}")
+    opened = checks.attempt(lambda: open_trial(trial, facts), lambda opened: f"frames: {_count_frames(trial, opened)}")
     if opened is None:
         return
     recording = opened.recording
@@ -154,8 +155,8 @@ def _exists(trial: Trial, name: str | None) -> bool:
     return name is None or trial.path(name).exists()
 
 
-def _describe_frames(opened: Opened[Recording]) -> str:
-    n = opened.recording.n_frames
+def _count_frames(trial: Trial, opened: Opened[Recording]) -> str:
+    n = replace(opened.recording, start=trial.first_frame).n_frames
     return "to the videos' end" if n is None else f"{n} to track"
 
 

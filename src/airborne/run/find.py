@@ -20,6 +20,7 @@ from airborne.io.folder_lock import refuse_links
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
 from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
+from airborne.tracking.backward import turn_time
 from airborne.tracking.first_pose.candidates import StartSearch, find_thing
 from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, spread_sample
 from airborne.tracking.first_pose.person_candidates import find_person
@@ -210,13 +211,13 @@ def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: S
     kept = frames_up_to(trial, recording, found)
     if not kept:
         return found, pose
-    backward = [replace(frames, time_s=-frames.time_s) for frames in reversed(kept)]
+    backward = [turn_time(frames) for frames in reversed(kept)]
     tracker = RefinedTracker(sample_body_colours(model, pose, backward[0]), pose)
     earliest = found, pose
-    for frames, estimate in track_frames(tracker, backward, lambda estimate: None):
+    for _, estimate in track_frames(tracker, backward, lambda estimate: None):
         if estimate.status is Status.TRACKED and estimate.pose is not None:
-            earliest = frames.index, estimate.pose
-        elif frames.index < found:  # a first frame may be uncertain: nothing was learned before it
+            earliest = -estimate.index, estimate.pose
+        elif -estimate.index < found:  # a first frame may be uncertain: nothing was learned before it
             break
     return earliest
 

@@ -13,6 +13,7 @@ from airborne.export.finding import draw_player_candidates
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
 from airborne.run.find import describe_probability, frames_up_to, look_through, open_candidates, take_candidate
 from airborne.tracking import Status
+from airborne.tracking.backward import turn_time
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.first_pose.players import PlayersSearch, find_players
 from airborne.tracking.players import PlayerStart
@@ -120,7 +121,7 @@ def _track_back(trial: Trial, recording: Recording, finding: PlayersSearch) -> t
     tracker = Blocker(starts)
     state, earliest = tracker.init(), (found, starts)
     for frames in reversed(kept):
-        state, estimates = tracker.step(state, replace(frames, time_s=-frames.time_s))
+        state, estimates = tracker.step(state, turn_time(frames))
         statuses = {estimate.status for estimate in estimates}
         if Status.LOST in statuses:
             break

@@ -58,6 +58,11 @@ class PlayersRun:
         )
 
     @property
+    def n_frames(self) -> int | None:
+        """How many times to expect by the files' stated durations; None where they are unknown."""
+        return self.recording.n_frames
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The names that figures and videos show."""
         return tuple(start.name for start in self.starts)

@@ -44,9 +44,10 @@ def check_run(
     is_preset: bool,
 ) -> CheckedRun:
     """Check a finished run by some of its frames, and its first pose."""
-    rows, frames = np.flatnonzero(motion.has_pose), list(kept)
-    if not len(rows) or not frames:
+    rows, first = np.flatnonzero(motion.has_pose), next(iter(kept), None)
+    if not len(rows) or first is None:
         return CheckedRun(motion, None, ())
+    frames = sorted(kept, key=lambda each: each.index)
     poses = [motion.pose(row) for row in rows]
     path = TrackedPath(motion.index[rows], motion.time_s[rows], poses, motion.covariance[rows, :6, :6])
     calibrated = {} if calibration is None else {fit.name: fit.covariance for fit in calibration.fits}
@@ -54,7 +55,7 @@ def check_run(
     run = gather_equations(model, rig, path, frames, calibrated=calibrated, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
     status, sentences = motion.status.astype(f"<U{max(map(len, Status))}"), []
-    for reason, is_doubtful in doubts(model, path, frames, start, found).items():
+    for reason, is_doubtful in doubts(model, path, frames, (start, first), found).items():
         doubtful = rows[is_doubtful & (motion.status[rows] == Status.TRACKED.value)]
         status[doubtful] = Status.UNCERTAIN.value
         if len(doubtful):

@@ -42,6 +42,11 @@ class Subject(Protocol[Found, AnyMotion]):
         ...
 
     @property
+    def n_frames(self) -> int | None:
+        """How many times to expect; None where that is unknown."""
+        ...
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The names that figures and videos show."""
         ...

@@ -99,7 +99,8 @@ def track_trial(
             found = find(trial, folder, take=take, progress=looking)
             trial = found.trial
         if first_frame:
-            trial = trial.model_copy(update={"track": trial.track.model_copy(update={"stop": trial.start.frame + 1})})
+            alone = {"start": None, "stop": trial.start.frame + 1}
+            trial = trial.model_copy(update={"track": trial.track.model_copy(update=alone)})
         drawn = None if not pictures else "stills" if first_frame else "videos"
         options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress, stage_progress)
         facts = None if found is None else found.facts
@@ -193,7 +194,7 @@ def _track(
         if first is None:
             raise past_the_end_error(subject.trial, recording)
         if options.progress is not None:
-            options.progress(0, recording.n_frames)  # seeing a person takes seconds
+            options.progress(0, subject.n_frames)  # seeing a person takes seconds
         subject = subject.see(first)
         subject.copy_inputs(folder)
         done = subject.read_done(folder) if resume else {}
@@ -207,7 +208,7 @@ def _track(
             nonlocal most
             most = max(most, n_done)  # gone over in both directions, frames are counted before they are yielded
             if options.progress is not None:
-                options.progress(most, recording.n_frames)
+                options.progress(most, subject.n_frames)
 
         tracked = subject.track(chain([first], frames), partial(subject.write, writer), done, tick)
         try:

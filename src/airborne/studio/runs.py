@@ -93,7 +93,7 @@ def last_frame(trial: Trial, n_images: int) -> int:
 
 def _frames_of(trial: Trial, n_images: int) -> range:
     stop = n_images if trial.track.stop is None else min(n_images, trial.track.stop)
-    return range(trial.start.frame, stop, trial.track.every)
+    return range(trial.first_frame, stop, trial.track.every)
 
 
 def describe_progress(n_done: int, n_frames: int) -> str:

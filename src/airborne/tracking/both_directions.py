@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Protocol
 
 from airborne.body import BodyModel, Pose
+from airborne.tracking.backward import turn_estimate, turn_time
 from airborne.tracking.estimate import Estimate
 from airborne.tracking.passes import Passes, differences, join_passes
 from airborne.tracking.tracker import Tracker
@@ -106,14 +106,8 @@ def _track_both_ways(
         ahead = forward[observed.index]
         pair = differences(model, ahead, back)
         nats = None if not pair.candidates else tracker.weigh(state, turned, pair.candidates)
-        passes.append(Passes(ahead, replace(back, time_s=observed.time_s), pair, nats))
+        passes.append(Passes(ahead, turn_estimate(back), pair, nats))
         state = tracker.learn(state, turned, back)
         report(len(forward) + len(passes))
     joined = join_passes(model, passes[::-1])
     return {**forward, **{estimate.index: estimate for estimate in joined}}
-
-
-def turn_time(frames: Frames) -> Frames:
-    """Return frames with their time counted backward."""
-    views = (view and replace(view, delay_s=-view.delay_s) for view in frames.views)
-    return replace(frames, time_s=-frames.time_s, views=tuple(views))

@@ -79,12 +79,8 @@ class Trial(SettingsTable):
         return self
 
     @model_validator(mode="after")
-    def _check_stop(self) -> Trial:
-        stop, frame = self.track.stop, self.start.frame
-        if stop is not None and stop <= frame:
-            raise ValueError(
-                f"track.stop = {stop} leaves no frame, as start.frame = {frame}; give a later one, or none"
-            )
+    def _check_stretch(self) -> Trial:
+        self.track.check_stretch(self.start.frame)
         return self
 
     @model_validator(mode="after")
@@ -157,6 +153,11 @@ class Trial(SettingsTable):
             raise TrialError(f"{self.name}: method '{self.track.method}' is of players; this needs one whole body")
         lights = self.lights
         return self.track.with_lights(lights and lights.lights, is_exact=lights is not None and lights.is_exact)
+
+    @property
+    def first_frame(self) -> int:
+        """The first frame that is tracked: `start.frame`, or one before it, from there back."""
+        return self.track.first_frame(self.start.frame)
 
     @property
     def directions(self) -> Directions:

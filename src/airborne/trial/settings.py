@@ -41,11 +41,23 @@ class _Settings(SettingsTable):
             raise ValueError(f"{', '.join(unread)}: not read by method '{table['method']}'; remove it")
         return table
 
+    def check_stretch(self, frame: int) -> None:
+        """Raise ValueError where no frame is left to track from a start in `frame` on."""
+        if self.stop is not None and self.stop <= frame:
+            raise ValueError(
+                f"track.stop = {self.stop} leaves no frame, as start.frame = {frame}; give a later one, or none"
+            )
+
+    def first_frame(self, frame: int) -> int:
+        """Return the first frame that is tracked, by that of the start."""
+        return frame
+
 
 class BodySettings(_Settings):
     """Methods of one body. A file may set what its method leaves unread, so that methods can be compared on it."""
 
     method: Method = "refined"
+    start: Annotated[int, Field(ge=0)] | None = None  # the first frame or field; before start.frame, tracked backward
     prediction: Prediction = "smooth"
     directions: Directions = "both"  # between [[key]] tables and of limbs found again; or forward alone
     whole_run: Switch = True  # refined: fit a person's poses of all frames once more, all at once
@@ -61,6 +73,19 @@ class BodySettings(_Settings):
         if len(self.steps_mm) != len(self.steps_deg) or not self.steps_mm:
             raise ValueError("steps_mm and steps_deg need one number each for every loop, equally many")
         return self
+
+    def check_stretch(self, frame: int) -> None:
+        """Raise ValueError where no frame is left to track from a start in `frame` on, or none before it."""
+        super().check_stretch(frame)
+        if self.start is not None and self.start > frame:
+            raise ValueError(
+                f"track.start = {self.start} lies after start.frame = {frame}, from where the body is followed; give "
+                "that frame, an earlier one, or none"
+            )
+
+    def first_frame(self, frame: int) -> int:
+        """Return the first frame that is tracked, by that of the start: that, or one before it."""
+        return frame if self.start is None else frame - (frame - self.start) // self.every * self.every
 
     @property
     def fits_whole_run(self) -> bool:

@@ -15,7 +15,7 @@ N_LISTED = 5  # runs listed by their frames; of further ones only the number is 
 
 @dataclass(slots=True, eq=False)
 class _FrameRuns:
-    """Runs of consecutive frames: their number, and the ends of the first few."""
+    """Runs of consecutive frames, upward or downward: their number, and the ends of the first few."""
 
     n_frames: int = 0
     n_runs: int = 0
@@ -35,7 +35,7 @@ class _FrameRuns:
 
     def describe(self) -> str:
         """Name the frames: "frames 3 to 9, 12"."""
-        listed = ", ".join(f"{a} to {b}" if a != b else f"{a}" for a, b in self.ends)
+        listed = ", ".join(f"{a} to {b}" if a != b else f"{a}" for a, b in map(sorted, self.ends))
         more = self.n_runs - len(self.ends)
         return f"frame{'s' if self.n_frames > 1 else ''} {listed}" + (f" and {more} more times" if more else "")
 
@@ -49,18 +49,23 @@ class Outages:
         default_factory=dict
     )  # camera -> first and last frames of it
     _n_times: int = 0
+    _last: int = -1  # frame
+    _n_jumps: int = 0  # 1 once frames before the start are added, the last one first: no run lasts over the jump
     _missing: dict[str, _FrameRuns] = field(default_factory=dict)
     _dark: dict[str, _FrameRuns] = field(default_factory=dict)
 
     def add(self, frames: Frames) -> None:
         """Record the outages of one time; an image that is masked is none."""
+        if frames.index < self._last:
+            self._n_jumps = 1
+        self._last, place = frames.index, self._n_times + self._n_jumps
         for name, view in zip(self.names, frames.views, strict=True):
             if view is None and any(first <= frames.index <= last for first, last in self.masked.get(name, ())):
                 continue
             if view is None:
-                self._missing.setdefault(name, _FrameRuns()).add(frames.index, self._n_times)
+                self._missing.setdefault(name, _FrameRuns()).add(frames.index, place)
             elif is_dark(view):
-                self._dark.setdefault(name, _FrameRuns()).add(frames.index, self._n_times)
+                self._dark.setdefault(name, _FrameRuns()).add(frames.index, place)
         self._n_times += 1
 
     def describe(self) -> Iterator[str]:

@@ -115,7 +115,8 @@ def test_a_mask_that_shrinks_over_an_unchanged_picture_is_doubtful():
     still = [replace(frames_seen()[0], index=i) for i in range(8)]
     far = [start.move(0.5 * i * np.array([0.0, 1.0, 0.0]), np.zeros(3)) for i in range(8)]
     path = TrackedPath(np.arange(8), np.arange(8) / FPS, far, np.zeros((8, 6, 6)))
-    found = doubts(CROSS, path, [replace(f, views=f.views[:1]) for f in still], start, None)
+    seen = [replace(f, views=f.views[:1]) for f in still]
+    found = doubts(CROSS, path, seen, (start, seen[0]), None)
     stayed = next(iter(found.values()))
     assert stayed[4:].all() and not stayed[0]
 
@@ -123,4 +124,5 @@ def test_a_mask_that_shrinks_over_an_unchanged_picture_is_doubtful():
 def test_a_body_that_really_leaves_is_not_doubtful():
     poses = [SCENE.start(i) for i in INDICES]
     path = TrackedPath(np.arange(24), np.arange(24) / FPS, poses, np.zeros((24, 6, 6)))
-    assert not any(each.any() for each in doubts(CROSS, path, frames_seen(), poses[0], None).values())
+    frames = frames_seen()
+    assert not any(each.any() for each in doubts(CROSS, path, frames, (poses[0], frames[0]), None).values())

@@ -1,4 +1,4 @@
-"""How the next run is tracked: the method and the last frame, as the trial's [track] has them."""
+"""How the next run is tracked: the method, the first and the last frame, as the trial's [track] has them."""
 
 from __future__ import annotations
 
@@ -29,12 +29,17 @@ class TrackSettingsBar:
         methods = PLAYERS_METHODS if self._trial.has_players else BODY_METHODS
         self._method = ui.select(list(methods), label="method", value=None, on_change=self._set_method)
         self._method.props("outlined dense options-dense").style("min-width: 140px")
+        self._first = ui.number("first frame", min=0, max=self._n_images - 1, precision=0)
+        self._first.props("outlined dense clearable").style("width: 120px")
+        # the text is sent along: the field may have been set anew since it was typed
+        self._first.on("change", lambda event: self._set_first(str(event.args)))
+        self._first.on("clear", lambda: self._set_first(""), args=[])
+        self._first.set_visibility(not self._trial.has_players)
         self._last = ui.number("last frame", min=0, max=self._n_images - 1, precision=0)
         self._last.props("outlined dense clearable").style("width: 120px")
-        # the text is sent along: the field may have been set anew since it was typed
         self._last.on("change", lambda event: self._set_last(str(event.args)))
         self._last.on("clear", lambda: self._set_last(""), args=[])
-        self._first = ui.label().classes("small soft")
+        self._start = ui.label().classes("small soft")
         self._show()
 
     def reread(self) -> None:
@@ -48,18 +53,30 @@ class TrackSettingsBar:
         track, frame = self._trial.track, self._trial.start.frame
         self._method.set_value(track.method)
         self._last.set_value(min(self._n_images, track.stop or self._n_images) - 1)
+        self._first.set_value(self._trial.first_frame)
         whose = "where the body is looked for first" if self._trial.start.find else "the first pose's"
-        self._first.set_text(f"from frame {frame}, {whose}")
+        self._start.set_text(
+            f"from frame {frame}, {whose}" + (", on and back" if self._trial.first_frame < frame else "")
+        )
 
     def _set_method(self) -> None:
         if self._method.value != self._trial.track.method:
             self._set("method", self._method.value, f"method {self._method.value}")
 
-    def _set_last(self, text: str) -> None:
-        frame, number = self._trial.start.frame, float(text) if text else self._n_images - 1
+    def _set_first(self, text: str) -> None:
+        frame = self._trial.start.frame
         with show_errors():
-            if number != (last := int(number)):
-                raise TrialError(f"{number:g} is no frame; give a whole number")
+            first = _whole(text) if text else frame
+            if first > frame:
+                raise TrialError(f"the first pose is that of frame {frame}; give a first frame up to there")
+            if first != self._trial.first_frame:
+                self._set("start", first if first < frame else None, f"first frame {first}")
+        self._show()
+
+    def _set_last(self, text: str) -> None:
+        frame = self._trial.start.frame
+        with show_errors():
+            last = _whole(text) if text else self._n_images - 1
             if last < frame:
                 raise TrialError(f"the first pose is that of frame {frame}; give a last frame from there on")
             if last >= self._n_images:
@@ -73,3 +90,11 @@ class TrackSettingsBar:
         with show_errors():
             self._session.set_table("track", {key: value}, what)
         self.reread()
+
+
+def _whole(text: str) -> int:
+    """Return the number of a frame that was typed. Raises TrialError for a fraction."""
+    number = float(text)
+    if number != int(number):
+        raise TrialError(f"{number:g} is no frame; give a whole number")
+    return int(number)

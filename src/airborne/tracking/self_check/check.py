@@ -107,12 +107,15 @@ def _constant_errors(errors: PoseErrors, diagnosis: Diagnosis, n: int) -> Array:
 
 
 def doubts(
-    model: BodyModel, path: TrackedPath, kept: Sequence[Frames], start: Pose, found: SelfCheck | None
+    model: BodyModel, path: TrackedPath, kept: Sequence[Frames], start: tuple[Pose, Frames], found: SelfCheck | None
 ) -> dict[str, NDArray[np.bool_]]:
-    """Return which frames of a path are in doubt (n,), by what speaks against them; reasons without a frame too."""
+    """Return which frames of a path are in doubt (n,), by what speaks against them; reasons without a frame too.
+
+    `kept` are in the order of time, `start` is the first pose and its frames.
+    """
     render_model, rows = RenderModel.of(model), [path.row(frames.index) for frames in kept]
     pairs = [(row, frames) for row, frames in zip(rows, kept, strict=True) if row is not None]
-    stayed = [has_stayed(render_model, start, path.poses[row], kept[0], frames) for row, frames in pairs]
+    stayed = [has_stayed(render_model, start[0], path.poses[row], start[1], frames) for row, frames in pairs]
     at = path.index[[row for row, _ in pairs]]
     none = np.zeros(len(path.index), bool)
     return {
