@@ -116,6 +116,26 @@ def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp
         track_trial(trial, out, take=2, resume=True, first_frame=True, pictures=False)
 
 
+def test_poses_that_disagree_with_what_moves_are_not_called_likely(path, tmp_path, monkeypatch):
+    find_thing = find.find_thing
+
+    def disagreeing(model, moments):
+        finding = find_thing(model, moments)
+        first = replace(finding.candidates[0], is_plausible=False, precision=0.2, recall=0.1)
+        return replace(finding, candidates=(first,))
+
+    drawn: list[str] = []
+    monkeypatch.setattr(find, "find_thing", disagreeing)
+    monkeypatch.setattr(
+        "airborne.export.finding.draw_candidates", lambda path, moment, poses: drawn.extend(text for text, _ in poses)
+    )
+    with pytest.raises(UndecidedError, match=r"20% of the outline .*check that each camera has its own video"):
+        find.find_start(read_trial(path), tmp_path)
+    assert drawn == ["disagrees: 20% stands out"]
+    (written,) = json.loads((tmp_path / "candidates.json").read_text(encoding="utf-8"))["candidates"]
+    assert written["is_plausible"] is False
+
+
 def test_what_cannot_be_found_is_said(path, tmp_path):
     trial = read_trial(path)
     with pytest.raises(TrialError, match="finding the body needs two cameras"):

@@ -21,7 +21,7 @@ from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_o
 from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
 from airborne.tracking.backward import turn_time
-from airborne.tracking.first_pose.candidates import StartSearch, find_thing
+from airborne.tracking.first_pose.candidates import Candidate, StartSearch, find_thing
 from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, spread_sample
 from airborne.tracking.first_pose.person_candidates import find_person
 from airborne.tracking.first_pose.players import PlayersSearch
@@ -167,12 +167,13 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
     draw_candidates(
         folder / CANDIDATES_PICTURE,
         finding.moment,
-        [(f"{each.probability:.0%}", model.with_pose(each.pose)) for each in finding.candidates],
+        [(_describe_candidate(each), model.with_pose(each.pose)) for each in finding.candidates],
     )
     if not best.is_plausible:
         reason = (
             f"no pose agrees with what moves in frame {frame} (of the likeliest, {best.precision:.0%} of the outline "
-            f"stands out, and covers {best.recall:.0%} of what does); check [body] and [calibration]"
+            f"stands out, and covers {best.recall:.0%} of what does); check that each camera has its own video, "
+            "and [calibration] and [body]"
         )
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
@@ -180,6 +181,13 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
         f"{trial.name}: the start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}{sides}, then give "
         "--take 1 (or another number), or the pose under [start]"
     )
+
+
+def _describe_candidate(candidate: Candidate) -> str:
+    """Say how likely a pose is, or that its silhouettes do not agree with what stands out."""
+    if candidate.is_plausible:
+        return f"{candidate.probability:.0%}"
+    return f"disagrees: {candidate.precision:.0%} stands out"
 
 
 def _describe(model: BodyModel, finding: StartSearch) -> dict[str, Any]:
@@ -193,6 +201,7 @@ def _describe(model: BodyModel, finding: StartSearch) -> dict[str, Any]:
                 "probability": round(each.probability, 4),
                 "precision": round(each.precision, 3),
                 "recall": round(each.recall, 3),
+                "is_plausible": each.is_plausible,
                 "position_m": each.pose.world_from_root.translation.tolist(),
                 "quaternion_xyzw": each.pose.world_from_root.rotation.as_quat().tolist(),
                 "somersault_tilt_twist_deg": np.degrees(

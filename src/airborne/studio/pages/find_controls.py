@@ -94,5 +94,7 @@ class FindControls:
                 image._props["alt"] = "the candidates, one a row, in every camera; opens larger"
         with ui.element("div").classes("row-line"):
             for number, each in enumerate(self.candidates, start=1):
-                text = f"candidate {number}, {100 * each['probability']:.0f} %"
+                is_likely = each.get("is_plausible", True)  # of players and of what was found before, unsaid
+                how = f"{100 * each['probability']:.0f} %" if is_likely else "disagrees with what moves"
+                text = f"candidate {number}, {how}"
                 ui.button(text, on_click=partial(self.show, each)).props("flat dense no-caps")
