@@ -37,8 +37,8 @@ from airborne.motion.run_folder import TRACKED_MOTION, read_body_run
 from airborne.run.track import track_trial
 from airborne.synthetic import scene_frames
 from airborne.synthetic.flight.somersault import somersault_scene
+from airborne.tracking.both_directions import track_forward_backward
 from airborne.tracking.methods import Settings, tracker_of
-from airborne.tracking.revision import track_with_revision
 from airborne.trial.file import read_trial
 
 FLOORS = {"somersault_1": (30, 13, 100), "somersault_2": (34, 18, 120)}  # mm: mean, without offset, largest
@@ -67,7 +67,8 @@ def compare_synthetic(n: int | None = None) -> JointComparison:
     flight, rng = scene.flight(time_s), np.random.default_rng(7)
     off = np.append(START_M * np.array([1, 1, -1]) / np.sqrt(3), START_RAD * np.sign(rng.normal(size=model.n_dofs - 3)))
     tracker = tracker_of(Settings(), model, move_pose(flight.pose(0), off))
-    estimates = [estimate for _, estimate in track_with_revision(tracker, frames, lambda estimate: None)]
+    found = track_forward_backward(tracker, model, frames, write=lambda estimate: None)
+    estimates = [estimate for _, estimate in found]
     motion = Motion.collect(estimates, tuple(segment.name for segment in model.segments[1:]))
     points = np.array([model.with_pose(flight.pose(i)).landmarks for i in range(len(frames))])
     truth = JointPaths(names=tuple(each.name for each in model.landmarks), time_s=time_s, points=points)

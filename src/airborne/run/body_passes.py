@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from airborne.body import BodyModel, Pose
 from airborne.tracking import Estimate
 from airborne.tracking.backward import track_back
-from airborne.tracking.both_directions import track_between_keys
+from airborne.tracking.both_directions import track_between_keys, track_forward_backward
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import tracker_of
-from airborne.tracking.revision import track_with_revision
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.video import Frames, Recording
@@ -36,10 +35,10 @@ class BodyPasses:
     ) -> Tracked:
         """Yield each time's frames with the body's estimate there, written; between keys it is tracked both ways.
 
-        Without keys, limbs that were found again are followed back from there. `tick`: as a `Subject` takes it.
+        So is a body with limbs that has no keys, wherever one of them is in doubt. `tick`: as a `Subject` takes it.
         """
         if not self.keys or self.trial.directions == "forward":
-            return self._track_one_way(frames, write, done, tick)
+            return self._track(frames, write, done, tick)
         recording = self.recording
         frames_to_track = range(recording.start, max(self.keys) + 1, recording.every)
         tracker = tracker_of(self.trial.settings, self.model, self.start, self.keys)
@@ -52,9 +51,9 @@ class BodyPasses:
         if first == start:
             return iter(())
         frames = Rereading(self.recording).backward(first, start + 1)
-        return track_back(self._track_one_way, frames, start, write=write, done=done)
+        return track_back(self._track, frames, start, write=write, done=done)
 
-    def _track_one_way(
+    def _track(
         self,
         frames: Iterable[Frames],
         write: Write,
@@ -62,6 +61,6 @@ class BodyPasses:
         tick: Callable[[int], None] = lambda n_done: None,
     ) -> Tracked:
         tracker = tracker_of(self.trial.settings, self.model, self.start, self.keys)
-        if self.trial.directions == "forward" or not tracker.revises:
+        if self.trial.directions == "forward" or not tracker.moves_joints:
             return track_frames(tracker, frames, write, done)
-        return track_with_revision(tracker, frames, write, done, tick=tick)
+        return track_forward_backward(tracker, self.model, frames, write=write, done=done, tick=tick)

@@ -1,18 +1,22 @@
-"""Tracking between keys in both directions: forward from each key, backward from the next, joined frame by frame."""
+"""Tracking in both directions: forward, from a key or the last frame held backward, joined frame by frame."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice, pairwise
 from typing import Any, Protocol
 
 from airborne.body import BodyModel, Pose
 from airborne.tracking.backward import turn_estimate, turn_time
-from airborne.tracking.estimate import Estimate
+from airborne.tracking.estimate import Estimate, Status, unknown_segments
 from airborne.tracking.passes import Passes, differences, join_passes
 from airborne.tracking.tracker import Tracker
 from airborne.types import Array
 from airborne.video import Frames
+
+_MOST_BYTES = 6e8  # of pictures of a stretch that are held at once, as if converted
+_FEWEST_HELD = 16  # frames, whatever their bytes: limbs are lost for as long
 
 
 class TurningTracker(Tracker[Any, Estimate], Protocol):
@@ -56,28 +60,97 @@ def track_between_keys(
     tracker learns is what the joined estimates teach it, in the order of time: so a run is resumed, and frames that
     are `done` stay as they are, wherever they lie. `tick` takes how many frames are done.
     """
-    state, known = tracker.init(), done or {}
-    bounds, n_done = [frames.start, *(key + frames.step for key in (frames.start, *keys)), None], 0
+    stretches = _Stretches(tracker, model, write, done or {}, tick, tracker.init())
+    bounds = [frames.start, *(key + frames.step for key in (frames.start, *keys)), None]
     for start, stop in pairwise(bounds):
-        ahead: dict[int, Estimate] = {}
-        if (
-            start > frames.start
-            and stop is not None
-            and any(frame not in known for frame in range(start, stop, frames.step))
-        ):
+        stretch = None if start == frames.start or stop is None else range(start, stop, frames.step)
+        yield from stretches.track(reader, start, stop, stretch)
 
-            def report(n_tracked: int, n_before: int = n_done) -> None:
-                tick(n_before + n_tracked // 2)
 
-            stretch = range(start, stop, frames.step)
-            ahead = _track_both_ways(tracker, model, reader, state=state, stretch=stretch, known=known, report=report)
+def track_forward_backward(
+    tracker: TurningTracker,
+    model: BodyModel,
+    frames: Iterable[Frames],
+    *,
+    write: Callable[[Estimate], None],
+    done: Mapping[int, Estimate] | None = None,
+    tick: Callable[[int], None] = lambda n_done: None,
+) -> Iterator[tuple[Frames, Estimate]]:
+    """Yield each time's frames with their estimate, as `track_frames`, tracked in both directions without any key.
+
+    Stretches as long as memory holds are tracked forward and, where some frame or limb is in doubt, then back from the
+    last pose that was found, and joined as between keys. The first frame, in which the body is known, is tracked once.
+    """
+    stretches = _Stretches(tracker, model, write, done or {}, tick, tracker.init())
+    source = iter(frames)
+    held = list(islice(source, 1))
+    yield from stretches.track(_HeldFrames(held), 0, None, None)
+    n_held = max(int(_MOST_BYTES / max(held[0].n_bytes, 1)), _FEWEST_HELD) if held else 0
+    while held := list(islice(source, n_held)):
+        step = held[1].index - held[0].index if len(held) > 1 else 1
+        stretch = range(held[0].index, held[-1].index + step, step)
+        yield from stretches.track(_HeldFrames(held), stretch.start, stretch.stop, stretch, only_if_doubtful=True)
+
+
+@dataclass(frozen=True, slots=True)
+class _HeldFrames:
+    """Frames in memory, in the order of time, as a `FrameReader`."""
+
+    frames: Sequence[Frames]
+
+    def forward(self, start: int, stop: int | None) -> Iterator[Frames]:
+        """Yield the frames from `start` to before `stop`."""
+        return (each for each in self.frames if start <= each.index and (stop is None or each.index < stop))
+
+    def backward(self, start: int, stop: int) -> Iterator[Frames]:
+        """Yield the same in reverse, the last one first."""
+        return reversed(list(self.forward(start, stop)))
+
+
+@dataclass(slots=True, eq=False)
+class _Stretches:
+    """A run's stretches, one after the other; the tracker learns what the joined estimates teach it."""
+
+    tracker: TurningTracker
+    model: BodyModel
+    write: Callable[[Estimate], None]
+    known: Mapping[int, Estimate]
+    tick: Callable[[int], None]
+    state: Any
+    n_done: int = 0
+
+    def track(
+        self,
+        reader: FrameReader,
+        start: int,
+        stop: int | None,
+        both_ways: range | None,
+        *,
+        only_if_doubtful: bool = False,
+    ) -> Iterator[tuple[Frames, Estimate]]:
+        """Yield the frames from `start` to before `stop` with their estimates; `both_ways`, else forward alone."""
+        ahead, learned = dict[int, Estimate](), None
+        if both_ways is not None and any(frame not in self.known for frame in both_ways):
+            ahead, learned = _track_both_ways(
+                self.tracker,
+                self.model,
+                reader,
+                state=self.state,
+                stretch=both_ways,
+                known=self.known,
+                only_if_doubtful=only_if_doubtful,
+                report=lambda n_tracked: self.tick(self.n_done + n_tracked // 2),
+            )
         for observed in reader.forward(start, stop):
-            estimate = known.get(observed.index)
+            estimate = self.known.get(observed.index)
             if estimate is None:
-                estimate = ahead.get(observed.index) or tracker.search(state, observed)
-                write(estimate)
-            state, n_done = tracker.learn(state, observed, estimate), n_done + 1
+                estimate = ahead.get(observed.index) or self.tracker.search(self.state, observed)
+                self.write(estimate)
+            self.n_done += 1
+            if learned is None:
+                self.state = self.tracker.learn(self.state, observed, estimate)
             yield observed, estimate
+        self.state = self.state if learned is None else learned
 
 
 def _track_both_ways(
@@ -88,19 +161,25 @@ def _track_both_ways(
     state: Any,
     stretch: range,
     known: Mapping[int, Estimate],
+    only_if_doubtful: bool,
     report: Callable[[int], None],
-) -> dict[int, Estimate]:
-    """Track a stretch that ends with a key, both ways; a key that is known stays as it is."""
-    key, forward = stretch[-1], dict[int, Estimate]()
+) -> tuple[dict[int, Estimate], Any]:
+    """Track a stretch both ways, from its last frame with a pose back; if that is known it stays as it is.
+
+    Return the estimates, and what the tracker has learned by the end of a stretch that was tracked forward alone.
+    """
+    last, forward = stretch[-1], dict[int, Estimate]()
     for observed in reader.forward(stretch.start, stretch.stop):
-        estimate = (known.get(key) if observed.index == key else None) or tracker.search(state, observed)
+        estimate = (known.get(last) if observed.index == last else None) or tracker.search(state, observed)
         state, forward[observed.index] = tracker.learn(state, observed, estimate), estimate
         report(len(forward))
-    if key not in forward or forward[key].pose is None:
-        return forward  # the recording ends before, or the body is not seen there
+    turn = max((index for index, estimate in forward.items() if estimate.pose is not None), default=None)
+    is_doubtful = any(_is_doubtful(model, estimate) for estimate in forward.values())
+    if turn is None or (only_if_doubtful and not is_doubtful):
+        return forward, None if known.keys() & forward.keys() else state
     passes: list[Passes] = []
     state = tracker.turn(state)
-    for observed in reader.backward(stretch.start, key):
+    for observed in reader.backward(stretch.start, turn):
         turned = turn_time(observed)
         back = tracker.search(state, turned)
         ahead = forward[observed.index]
@@ -110,4 +189,9 @@ def _track_both_ways(
         state = tracker.learn(state, turned, back)
         report(len(forward) + len(passes))
     joined = join_passes(model, passes[::-1])
-    return {**forward, **{estimate.index: estimate for estimate in joined}}
+    return {**forward, **{estimate.index: estimate for estimate in joined}}, None
+
+
+def _is_doubtful(model: BodyModel, estimate: Estimate) -> bool:
+    """Whether a frame is not tracked, or the images do not show some limb where it is said to be."""
+    return estimate.status is not Status.TRACKED or bool(unknown_segments(estimate, model).any())

@@ -45,7 +45,6 @@ class Estimate:
     covariance: Array | None
     n_views: int  # cameras with an image that shows the body
     mask_shares: tuple[float, float] | None = None  # precision and recall of its mask, by what was learned before
-    moved: tuple[int, ...] = ()  # first segments of limbs found away from where they had been followed to
 
 
 def lost_estimate(index: int, time_s: Fraction) -> Estimate:

@@ -2,8 +2,9 @@
 
 Both see the same images, so that where they agree the joined information is the mean of the two, not the sum. Where
 a limb or the trunk disagrees, one of the passes has lost it: the forward pass is right up to some frame, and from
-there on the backward pass. That frame is where the images are likeliest over the whole stretch of disagreement. Where a
-joint is in two places that far apart the frame is uncertain, however sure the images seem: both may be wrong.
+there on the backward pass. That frame is where the images are likeliest over the whole stretch of disagreement. A limb
+that is in two places is as uncertain as they are apart, however sure the images seem: both may be wrong. Where trunks
+are far apart the frame is uncertain.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class PassDifference:
 
     delta: Array  # (6 + 3 joints,) from the forward to the backward one; empty where either has no pose
     apart: tuple[int, ...]  # the parts, see `parts_of`, that disagree: beyond their covariances, or by _APART_M
-    is_far: bool  # whether a joint is further apart than _APART_M
+    is_far: bool  # whether a joint of the trunk is further apart than _APART_M
     candidates: tuple[Pose, ...]  # the forward pose, and it with each of those parts as the backward pass has it
 
 
@@ -69,7 +70,7 @@ def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> Pass
         for k, own in enumerate(parts)
         if _is_apart(delta[own], covariance[np.ix_(own, own)]) or np.any(off_m[part_of == k] > _APART_M)
     )
-    is_far = bool(np.any(off_m > _APART_M))
+    is_far = bool(np.any(off_m[part_of == 0] > _APART_M))
     if 0 in apart:
         return PassDifference(delta, tuple(range(len(parts))), is_far, (forward.pose, backward.pose))
     candidates = (forward.pose, *(_with_limbs(model, forward.pose, backward.pose, [k]) for k in apart)) if apart else ()

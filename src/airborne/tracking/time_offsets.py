@@ -21,7 +21,6 @@ from airborne.tracking.estimate import Estimate
 from airborne.tracking.model_based.image_evidence import ImageEvidence
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.predictors import PoseHistory, turn_past
-from airborne.tracking.revision import FrameRecord
 from airborne.types import Array
 from airborne.video import Frames, View
 
@@ -49,9 +48,9 @@ class CompensatedTracker:
         self._tracker = tracker
 
     @property
-    def revises(self) -> bool:
-        """Whether what was found may be revised later."""
-        return bool(getattr(self._tracker, "revises", False))
+    def moves_joints(self) -> bool:
+        """Whether limbs are tracked, which may be lost."""
+        return bool(getattr(self._tracker, "moves_joints", False))
 
     def init(self) -> CompensatedState:
         """Return the state before the first frame."""
@@ -74,10 +73,6 @@ class CompensatedTracker:
         """Return the state from which the body is tracked back in time."""
         return CompensatedState(self._tracker.turn(state.inner), turn_past(state.past))
 
-    def revise(self, records: Sequence[FrameRecord], state: CompensatedState) -> dict[int, Estimate]:
-        """Return better estimates of earlier records, given the newest one and the state after it."""
-        return self._tracker.revise([_compensate_record(record) for record in records], state.inner)
-
     def weigh(self, state: CompensatedState, frames: Frames, poses: Sequence[Pose]) -> Array:
         """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""
         return self._tracker.weigh(state.inner, compensate_offsets(frames, state.past), poses)
@@ -94,13 +89,6 @@ class CompensatedTracker:
         """Return what the images say about the newest of the poses in `past`, which is that of the frames."""
         compensated = compensate_offsets(frames, past[-_HISTORY:])
         return self._tracker.linearise(state.inner, compensated, past[-1][1], misfit, surface=surface)
-
-
-def _compensate_record(record: FrameRecord) -> FrameRecord:
-    """Compensate a record's frames, by the motion that ends in what was found there."""
-    past, pose = record.state.past, record.estimate.pose
-    past = past if pose is None else _extend(past, record.frames, pose)
-    return replace(record, frames=compensate_offsets(record.frames, past), state=record.state.inner)
 
 
 def compensate_offsets(frames: Frames, past: PoseHistory, degree: int = 2) -> Frames:

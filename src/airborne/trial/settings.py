@@ -59,7 +59,7 @@ class BodySettings(_Settings):
     method: Method = "refined"
     start: Annotated[int, Field(ge=0)] | None = None  # the first frame or field; before start.frame, tracked backward
     prediction: Prediction = "smooth"
-    directions: Directions = "both"  # between [[key]] tables and of limbs found again; or forward alone
+    directions: Directions = "both"  # between [[key]] tables, and of people; or forward alone
     whole_run: Switch = True  # refined: fit a person's poses of all frames once more, all at once
     fixed_shape: Switch = False  # joint angles stay those of the start; stepping and simplex never change them
     colour: ScoreName = "normalised"  # stepping and simplex: paper B's score

@@ -32,7 +32,6 @@ from airborne.tracking.model_based.gauss_newton import (
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import (
-    DISTINCT_M,
     SAME_M,
     find_misplaced_limbs,
     limb_distance,
@@ -63,7 +62,6 @@ class JudgedFit:
 
     fit: Fit
     agreement: MaskAgreement
-    moved: tuple[int, ...] = ()  # first segments of the limbs that were found away from where they were expected
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,13 +136,7 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        faults, limbs = self._refit_limbs(fit, guesses, learned, prior), limbs_of(self.model)
-        moved = [limb for limb in limbs if limb_distance(self.model, fit.pose, faults.fit.pose, limb) > DISTINCT_M]
-        return replace(self._assess(faults, learned), moved=tuple(int(limb[0]) for limb in moved))
-
-    def assess(self, fit: Fit, learned: LearnedRegions) -> JudgedFit:
-        """Judge a fit as it is."""
-        return self._assess(self._find_faults(fit, learned), learned)
+        return self._assess(self._refit_limbs(fit, guesses, learned, prior), learned)
 
     def _assess(self, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
         fit = faults.fit

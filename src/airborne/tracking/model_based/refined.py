@@ -6,7 +6,7 @@ A rigid body has the six degrees of freedom of its root. A body with joints is f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -20,7 +20,7 @@ from airborne.tracking.estimate import Estimate, Status, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
-from airborne.tracking.model_based.degrees_of_freedom import FIRST_POSE_SD, WIDE_SD, PosePrior, joints_of, limbs_of
+from airborne.tracking.model_based.degrees_of_freedom import FIRST_POSE_SD, WIDE_SD, PosePrior, joints_of
 from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, Order
@@ -28,12 +28,10 @@ from airborne.tracking.model_based.image_evidence import ImageEvidence, image_ev
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
-from airborne.tracking.model_based.limb_revision import follow_back
 from airborne.tracking.model_based.recovery import is_same, recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, status_of
 from airborne.tracking.model_based.support import mark_unobserved, shrink_unobserved, widen_unseen
-from airborne.tracking.revision import FrameRecord
 from airborne.types import Array
 from airborne.video import Frames
 
@@ -85,8 +83,8 @@ class RefinedTracker:
         self._keys = keys or {}
 
     @property
-    def revises(self) -> bool:
-        """Whether what was found may be revised later: where limbs were."""
+    def moves_joints(self) -> bool:
+        """Whether more than the root is tracked, so that limbs may be lost."""
         return self._fitter.moves_joints
 
     def init(self) -> RefinedState:
@@ -164,36 +162,6 @@ class RefinedTracker:
         args = surface or self.render_model, pose, self.reduce_frames(frames), state.appearance
         return image_evidence(*args, model=self._fitter.model, misfit=misfit)
 
-    def revise(self, records: Sequence[FrameRecord], state: RefinedState) -> dict[int, Estimate]:
-        """Return better estimates of earlier records, where limbs that the newest moved have been by then."""
-        newest, revised = records[-1], dict[int, Estimate]()
-        for limb in limbs_of(self._fitter.model):
-            if limb[0] not in newest.estimate.moved or newest.estimate.pose is None:
-                continue
-            path = follow_back(
-                self._fitter,
-                limb,
-                (newest.frames, newest.estimate.pose),
-                self._poses_before(records[:-1], revised),
-                appearance=state.appearance,
-                prior_of=self._prior_after,
-            )
-            for step in path:
-                record = next(each for each in records if each.frames.index == step.index)
-                judged = self._fitter.assess(step.fit, step.learned)
-                revised[step.index] = self._estimate(self.reduce_frames(record.frames), judged, record.state.reference)
-        return revised
-
-    def _poses_before(
-        self, records: Sequence[FrameRecord], revised: Mapping[int, Estimate]
-    ) -> Iterator[tuple[Frames, Pose]]:
-        """Yield the frames and poses of records, the latest first, as far back as the body was found."""
-        for record in reversed(records):
-            pose = revised.get(record.frames.index, record.estimate).pose
-            if pose is None:
-                return
-            yield self.reduce_frames(record.frames), pose
-
     def reduce_frames(self, frames: Frames) -> Frames:
         """Reduce the images of a body whose joints move: finer ones show more detail than the model has."""
         return reduce_frames(frames, self._posed_start, _MOST_PX_PER_M) if self._fitter.moves_joints else frames
@@ -269,7 +237,6 @@ class RefinedTracker:
             covariance=covariance,
             n_views=agreement.n_views,
             mask_shares=agreement.shares,
-            moved=found.moved,
         )
 
     def _prior_after(self, expected: Pose, gap_s: float) -> PosePrior | None:
