@@ -3,8 +3,8 @@
 Both see the same images, so that where they agree the joined information is the mean of the two, not the sum. Where
 a limb or the trunk disagrees, one of the passes has lost it: the forward pass is right up to some frame, and from
 there on the backward pass. That frame is where the images are likeliest over the whole stretch of disagreement. A limb
-that is in two places is as uncertain as they are apart, however sure the images seem: both may be wrong. Where trunks
-are far apart the frame is uncertain.
+that is in two places is as uncertain as they are apart, however sure the images seem: both may be wrong. Where the
+trunk disagrees too, and any joint is far apart, the frame is uncertain, and nothing is learned from it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class PassDifference:
 
     delta: Array  # (6 + 3 joints,) from the forward to the backward one; empty where either has no pose
     apart: tuple[int, ...]  # the parts, see `parts_of`, that disagree: beyond their covariances, or by _APART_M
-    is_far: bool  # whether a joint of the trunk is further apart than _APART_M
+    is_far: bool  # whether a joint is further apart than _APART_M
     candidates: tuple[Pose, ...]  # the forward pose, and it with each of those parts as the backward pass has it
 
 
@@ -70,7 +70,7 @@ def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> Pass
         for k, own in enumerate(parts)
         if _is_apart(delta[own], covariance[np.ix_(own, own)]) or np.any(off_m[part_of == k] > _APART_M)
     )
-    is_far = bool(np.any(off_m[part_of == 0] > _APART_M))
+    is_far = bool(np.any(off_m > _APART_M))
     if 0 in apart:
         return PassDifference(delta, tuple(range(len(parts))), is_far, (forward.pose, backward.pose))
     candidates = (forward.pose, *(_with_limbs(model, forward.pose, backward.pose, [k]) for k in apart)) if apart else ()
@@ -135,7 +135,7 @@ def _join(model: BodyModel, passes: Passes, takes_backward: NDArray[np.bool_]) -
         pose = _with_limbs(model, forward.pose, backward.pose, [k for k in difference.apart if takes_backward[k]])
     for k in difference.apart:
         covariance[np.ix_(parts[k], parts[k])] += np.outer(delta[parts[k]], delta[parts[k]])
-    status = Status.UNCERTAIN if difference.is_far else better.status
+    status = Status.UNCERTAIN if difference.is_far and 0 in difference.apart else better.status
     return replace(better, pose=pose, covariance=with_unobserved(covariance), status=status)
 
 
