@@ -90,6 +90,12 @@ def test_what_no_direction_sees_stays_lost_and_the_rest_is_found(gone):
     assert all(np.abs(delta_between(TRUTH, each.pose)).max() < 1e-9 for each in estimates if each.pose is not None)
 
 
+def test_frames_that_are_counted_backward_are_tracked_as_others():
+    frames = map(nothing, range(-3, 5))
+    run = track_forward_backward(LosesAnArm(), HUMAN, frames, write=lambda estimate: None)
+    assert [estimate.index for _, estimate in run] == list(range(-3, 5))
+
+
 @pytest.mark.parametrize("n", [0, 1, 2, 3])
 def test_the_shortest_recordings_end_where_they_end(n):
     assert [each.index for each in found_by(LosesAnArm(), n)] == list(range(n))

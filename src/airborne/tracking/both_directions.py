@@ -83,9 +83,11 @@ def track_forward_backward(
     """
     stretches = _Stretches(tracker, model, write, done or {}, tick, tracker.init())
     source = iter(frames)
-    held = list(islice(source, 1))
-    yield from stretches.track(_HeldFrames(held), 0, None, None)
-    n_held = max(int(_MOST_BYTES / max(held[0].n_bytes, 1)), _FEWEST_HELD) if held else 0
+    first = next(source, None)
+    if first is None:
+        return
+    yield from stretches.track(_HeldFrames([first]), first.index, None, None)
+    n_held = max(int(_MOST_BYTES / max(first.n_bytes, 1)), _FEWEST_HELD)
     while held := list(islice(source, n_held)):
         step = held[1].index - held[0].index if len(held) > 1 else 1
         stretch = range(held[0].index, held[-1].index + step, step)
