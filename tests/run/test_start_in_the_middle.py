@@ -1,12 +1,14 @@
 """A start in the middle of a recording: the frames before it are tracked from there back."""
 
 import csv
+import json
 
 import av
 import numpy as np
 import pytest
 
-from airborne.errors import TrialError
+from airborne.errors import ResultError, TrialError
+from airborne.motion.run_folder import RUN_RECORD
 from airborne.run.check import check_trial
 from airborne.run.track import track_trial
 from airborne.tracking.model_based.refined import RefinedTracker
@@ -94,6 +96,21 @@ def test_a_run_that_is_killed_goes_on_to_the_same_result(middle, run, tmp_path, 
             track_trial(middle(0), tmp_path / "run", pictures=False)
     track_trial(middle(0), tmp_path / "run", resume=True, pictures=False)
     assert (tmp_path / "run" / "motion.csv").read_bytes() == (run[0] / "motion.csv").read_bytes()
+
+
+def test_a_run_that_was_recorded_before_there_was_a_first_frame_goes_on(middle, tmp_path):
+    alone = middle(None, every=3)
+    track_trial(alone, tmp_path / "run", pictures=False)
+    path = tmp_path / "run" / RUN_RECORD
+    record = json.loads(path.read_text())
+    del record["settings"]["start"]
+    path.write_text(json.dumps(record))
+    with pytest.raises(ResultError, match="start = None, now 0"):
+        track_trial(middle(0, every=3), tmp_path / "run", resume=True, pictures=False)
+    assert track_trial(alone, tmp_path / "run", resume=True, pictures=False).motion.index.tolist() == [
+        MIDDLE,
+        MIDDLE + 3,
+    ]
 
 
 def test_of_every_second_frame_the_start_is_one(middle, tmp_path):

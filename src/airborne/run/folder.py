@@ -77,7 +77,7 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
-    recorded = _with_keys(read_record(record), identity)
+    recorded = _with_settings(_with_keys(read_record(record), identity), identity)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
     is_corrected = table == MOTION and bool(changed) and set(changed) <= {"keys", "masks"}
     if changed and not is_corrected:
@@ -121,6 +121,13 @@ def _with_keys(recorded: dict[str, Any], identity: dict[str, Any]) -> dict[str, 
     """Return a record with keys and masks; older ones have neither, and only the start of what they are beside."""
     first = {frame: digest for frame, digest in identity["keys"].items() if digest == START}
     return {"keys": first, "masks": [], **recorded}
+
+
+def _with_settings(recorded: dict[str, Any], identity: dict[str, Any]) -> dict[str, Any]:
+    """Return a record with the settings that did not exist when it was written, as if none had been given."""
+    settings = recorded.get("settings")
+    known = settings if isinstance(settings, dict) else {}
+    return {**recorded, "settings": {**dict.fromkeys(identity["settings"]), **known}}
 
 
 def _mask_changes(*identities: Mapping[str, Any]) -> list[dict[str, Any]]:
