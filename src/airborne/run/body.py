@@ -264,7 +264,8 @@ class BodyRun:
         """Fit the whole run; what the tracker found stays beside it, for a run that is resumed and for a comparison."""
         estimates, reader = read_estimates(folder / self.table), Rereading(self.recording)
         args = reader, self.trial.settings, self.model, motion, estimates
-        fitted = fit_whole_run(*args, keys=self.keys, progress=progress)
+        is_joined = self.trial.directions == "both" and not self.keys
+        fitted = fit_whole_run(*args, keys=self.keys, is_joined=is_joined, progress=progress)
         if fitted is not None:
             tables_of(folder)
             copy_motion(folder / self.table, folder / TRACKED_MOTION)

@@ -56,13 +56,15 @@ def fit_whole_run(
     estimates: Sequence[Estimate],
     *,
     keys: Collection[int] = (),
+    is_joined: bool = False,
     progress: Progress | None = None,
 ) -> FittedRun | None:
     """Fit the poses of a run to its images and to how bodies move; None where nothing can be fitted.
 
     Motion is smooth between take-offs, landings and gaps, in stretches of five frames or more; other frames stay as
     they are. `estimates` are those of the tracker, one for each row of the motion. In frames that have a key it is the
-    tracked pose that counts, as someone has said there what images do not. Statuses stay.
+    tracked pose that counts, as someone has said there what images do not. Statuses stay. Of poses that are joined from
+    both directions a lost limb's are the likelier ones already; others begin on the way between frames that know it.
     """
     windows = [window for window in _windows(motion, model) if window.stretches]
     if not windows:
@@ -75,8 +77,9 @@ def fit_whole_run(
     for window in windows:
         rows, time_s = window.rows, motion.time_s[window.rows]
         poses = [motion.pose(row) for row in rows]
-        start = bridge_lost_limbs(model, poses, time_s, motion.covariance[rows], window.stretches)
-        fit = fit_run(model, start, time_s, window.stretches, _Look(images, window))
+        if not is_joined:
+            poses = bridge_lost_limbs(model, poses, time_s, motion.covariance[rows], window.stretches)
+        fit = fit_run(model, poses, time_s, window.stretches, _Look(images, window))
         covariances = smooth_covariances(model, fit, time_s, window.stretches, motion.covariance[rows])
         for row, pose, each in list(zip(rows, fit.poses, covariances, strict=True))[window.kept]:
             matrix = pose.world_from_root.as_matrix()
