@@ -1,6 +1,6 @@
 """A body is tracked forward and backward without any key: what one direction loses, the other has."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -12,18 +12,12 @@ from airborne.tracking.both_directions import track_forward_backward
 from airborne.tracking.estimate import Estimate, Status, lost_estimate
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.video import Frames
-from tests.support.people import HUMAN, swinging
+from tests.support.people import HUMAN
 from tests.support.scenes import CROSS, Scene, errors
+from tests.tracking.test_passes import TRUTH, with_arm
 
-N, TRUTH = 12, swinging(0)
+N = 12
 LOST = range(4, 8)  # frames in which the forward pass has the arm elsewhere
-
-
-def lifted(angle: float):
-    """The pose with its left arm lifted by an angle [rad]."""
-    angles = TRUTH.joint_angles.copy()
-    angles[HUMAN.index_of("upper_arm_left") - 1, 0] += angle
-    return replace(TRUTH, joint_angles=angles)
 
 
 @dataclass(frozen=True)
@@ -45,7 +39,7 @@ class LosesAnArm:
     def search(self, state, frames):
         if abs(frames.index) in self.gone:
             return lost_estimate(frames.index, frames.time_s)
-        pose = lifted(1.0) if state > 0 and frames.index in LOST else TRUTH
+        pose = with_arm(1.0) if state > 0 and frames.index in LOST else TRUTH
         is_uncertain = self.doubts and state > 0 and frames.index == LOST.start
         return Estimate(
             index=frames.index,
@@ -80,7 +74,7 @@ def test_an_arm_that_is_lost_is_where_the_backward_pass_has_it_and_as_uncertain_
 
 def test_where_nothing_is_in_doubt_the_body_is_tracked_forward_alone():
     pose = found_by(LosesAnArm(doubts=False))[LOST.start].pose
-    np.testing.assert_allclose(delta_between(lifted(1.0), pose), 0, atol=1e-9)
+    np.testing.assert_allclose(delta_between(with_arm(1.0), pose), 0, atol=1e-9)
 
 
 @pytest.mark.parametrize("gone", [(N - 1,), (N - 2, N - 1), (0,), tuple(range(N)), (5, 6)])

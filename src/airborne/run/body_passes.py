@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from airborne.body import BodyModel, Pose
 from airborne.tracking import Estimate
-from airborne.tracking.backward import track_back
+from airborne.tracking.backward import Tracked, Write, track_back
 from airborne.tracking.both_directions import track_between_keys, track_forward_backward
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import tracker_of
@@ -15,9 +15,6 @@ from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.video import Frames, Recording
 from airborne.video.rereading import Rereading
-
-Write = Callable[[Estimate], None]
-Tracked = Iterator[tuple[Frames, Estimate]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

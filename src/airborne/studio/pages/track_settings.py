@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from nicegui import ui
 
 from airborne.errors import TrialError
@@ -29,18 +31,19 @@ class TrackSettingsBar:
         methods = PLAYERS_METHODS if self._trial.has_players else BODY_METHODS
         self._method = ui.select(list(methods), label="method", value=None, on_change=self._set_method)
         self._method.props("outlined dense options-dense").style("min-width: 140px")
-        self._first = ui.number("first frame", min=0, max=self._n_images - 1, precision=0)
-        self._first.props("outlined dense clearable").style("width: 120px")
-        # the text is sent along: the field may have been set anew since it was typed
-        self._first.on("change", lambda event: self._set_first(str(event.args)))
-        self._first.on("clear", lambda: self._set_first(""), args=[])
+        self._first = self._frame_field("first frame", self._set_first)
         self._first.set_visibility(not self._trial.has_players)
-        self._last = ui.number("last frame", min=0, max=self._n_images - 1, precision=0)
-        self._last.props("outlined dense clearable").style("width: 120px")
-        self._last.on("change", lambda event: self._set_last(str(event.args)))
-        self._last.on("clear", lambda: self._set_last(""), args=[])
+        self._last = self._frame_field("last frame", self._set_last)
         self._start = ui.label().classes("small soft")
         self._show()
+
+    def _frame_field(self, label: str, on_text: Callable[[str], None]) -> ui.number:
+        field = ui.number(label, min=0, max=self._n_images - 1, precision=0)
+        field.props("outlined dense clearable").style("width: 120px")
+        # the text is sent along: the field may have been set anew since it was typed
+        field.on("change", lambda event: on_text(str(event.args)))
+        field.on("clear", lambda: on_text(""), args=[])
+        return field
 
     def reread(self) -> None:
         """Show what the trial has now; where that has not changed, what is being typed stays."""
