@@ -48,7 +48,7 @@ def _write_figure(path: Path, calibration: RigCalibration, i: int) -> Path:
         axes.imshow(example, cmap="gray", vmin=-500, vmax=300)  # pale, so that arrows stand out
     rng = np.random.default_rng(0)
     typical = _typical_px(calibration, i)
-    magnified = _ARROW_SHARE * max(width, height) / 2 / typical
+    magnified, arrows = _ARROW_SHARE * max(width, height) / 2 / typical, None
     for number, (source, residual) in enumerate(
         zip(calibration.adjustment.sources, calibration.adjustment.residual_px, strict=True)
     ):
@@ -59,14 +59,15 @@ def _write_figure(path: Path, calibration: RigCalibration, i: int) -> Path:
             continue
         colour, (u, v) = _COLOURS[number % len(_COLOURS)], source.px[rows].T
         du, dv = -residual[rows].T * magnified
-        axes.quiver(u, v, du, dv, color=colour, angles="xy", scale_units="xy", scale=1, width=0.0015)
+        arrows = axes.quiver(u, v, du, dv, color=colour, angles="xy", scale_units="xy", scale=1, width=0.0015)
         rms = np.sqrt(np.mean(np.sum(residual[rows] ** 2, axis=1)))
         axes.plot(u, v, ".", color=colour, markersize=2, label=f"{source.name}: {len(rows)} seen, RMS {rms:.2f} px")
     axes.set_xlim(-0.5, width - 0.5)
     axes.set_ylim(height - 0.5, -0.5)
     axes.set_aspect("equal")
     axes.set_title(f"{camera.name}: from where seen to where expected, {magnified:.0f} times", fontsize="medium")
-    if axes.get_legend_handles_labels()[0]:
+    if arrows is not None:
+        axes.quiverkey(arrows, 0.95, 1.03, magnified * typical, f"{typical:.2g} px", labelpos="W", color="black")
         figure.legend(loc="outside lower left", fontsize="small", ncols=3, markerscale=5)
     save_png(figure, path, dpi=110)
     return path

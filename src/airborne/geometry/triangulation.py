@@ -32,13 +32,18 @@ def triangulate(P: Array, px: Array, weights: Array | None = None) -> Array:
     points = triangulate_linear(P, px)
     root = np.ones(px.shape[:-1]) if weights is None else np.sqrt(weights)
     for _ in range(_N_STEPS):
-        residual, jacobian = _residual_and_jacobian(P, points, px)
-        jacobian = root[..., None, None] * jacobian
-        gradient = np.einsum("...cik,...ci->...k", jacobian, root[..., None] * residual)
-        points = points + np.einsum("...jk,...k->...j", _inverse(jacobian), gradient)
+        points = points + _gauss_newton_step(P, points, px, root)
     residual, jacobian = _residual_and_jacobian(P, points, px)
     is_lost = np.isnan(residual).any(axis=(-2, -1), keepdims=True) | np.isnan(_inverse(jacobian))
     return np.where(is_lost.any(axis=-1), np.nan, points)
+
+
+def _gauss_newton_step(P: Array, points: Array, px: Array, root: Array) -> Array:
+    """Return the step (..., 3) of least squares, residuals weighted by the squares of `root` (..., c)."""
+    residual, jacobian = _residual_and_jacobian(P, points, px)
+    jacobian = root[..., None, None] * jacobian
+    gradient = np.einsum("...cik,...ci->...k", jacobian, root[..., None] * residual)
+    return np.einsum("...jk,...k->...j", _inverse(jacobian), gradient)
 
 
 def triangulate_linear(P: Array, px: Array) -> Array:

@@ -56,16 +56,20 @@ def find_lags(measure: Callable[[Array, Array], LagEquations], lag_s: Array, *, 
         step, sd = solve_lags(measure(x[:n], x[n:]), with_drift=with_drift)
         step = np.nan_to_num(step)
         if last is not None:
-            taken, change = x - last[0], last[1] - step
-            with np.errstate(divide="ignore", invalid="ignore"):
-                secant = np.where(np.abs(taken) > 3 * _CONVERGED_S, taken / change, gain)
-            gain = np.clip(np.where(np.isfinite(secant) & (secant > 0), secant, gain), 1.0, _MOST_GAIN)
+            gain = _secant_gain(x - last[0], last[1] - step, gain)
         last = x, step
         x = x + gain * step
         if np.all(np.abs(step[:n]) < np.maximum(_CONVERGED_S, _CONVERGED_SDS * np.nan_to_num(sd[:n]))):
             break
     x, sd = np.where(np.isnan(sd), np.nan, x), gain * sd
     return CameraLags(x[:n], sd[:n], x[n:], sd[n:])
+
+
+def _secant_gain(taken: Array, change: Array, gain: Array) -> Array:
+    """Return by what factor each step is too short: what was taken by how much it changed the next one, else `gain`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        secant = np.where(np.abs(taken) > 3 * _CONVERGED_S, taken / change, gain)
+    return np.clip(np.where(np.isfinite(secant) & (secant > 0), secant, gain), 1.0, _MOST_GAIN)
 
 
 def solve_lags(equations: LagEquations, *, with_drift: bool = False) -> tuple[Array, Array]:

@@ -172,15 +172,21 @@ def _fit_displacement(track: _Track, rows: NDArray[np.integer]) -> Array:
     J, r = track.jacobian[rows], track.residual_px[rows]
     weights, displacement = np.ones(len(rows)), np.zeros(6)
     for _ in range(_N_STEPS):
-        information = np.einsum("nij,n,nik->jk", J, weights, J)
-        damping = 1e-6 * np.diag(np.diag(information))
-        displacement = np.linalg.solve(
-            information + damping + 1e-12 * np.eye(6), np.einsum("nij,n,ni->j", J, weights, r)
-        )
-        distances = np.linalg.norm(r - J @ displacement, axis=1)
-        scale = max(1.5 * float(np.median(distances)), _SCALE_PX / 4)
-        weights = 1 / (1 + (distances / scale) ** 2)
+        displacement = _displace(J, r, weights)
+        weights = _cauchy_weights(np.linalg.norm(r - J @ displacement, axis=1))
     return displacement
+
+
+def _displace(J: Array, r: Array, weights: Array) -> Array:
+    """Solve the weighted normal equations: (6,)."""
+    information = np.einsum("nij,n,nik->jk", J, weights, J)
+    damping = 1e-6 * np.diag(np.diag(information)) + 1e-12 * np.eye(6)
+    return np.linalg.solve(information + damping, np.einsum("nij,n,ni->j", J, weights, r))
+
+
+def _cauchy_weights(distances: Array) -> Array:
+    scale = max(1.5 * float(np.median(distances)), _SCALE_PX / 4)
+    return 1 / (1 + (distances / scale) ** 2)
 
 
 def _first_moment_after(track: _Track, before: Array, after: Array) -> int:

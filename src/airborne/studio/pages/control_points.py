@@ -179,7 +179,9 @@ class ControlPointsPanel(PointsPanel):
             fit, model = self.fits.get(camera, (b"", ""))[1], ""
             n = count_clicked(self.clicked, camera)
             if isinstance(fit, Calibration):
-                text, tone, model = f"{n} points, residual {fit.fits[0].rms_px:.2f} px RMS", "soft", fit.fits[0].model
+                own = fit.fits[0]
+                residual = f"residual {own.rms_px:.2f} px RMS, of a point left out {own.held_out_rms_px[own.model]:.2f}"
+                text, tone, model = f"{n} points, {residual}", "soft", own.model
             elif fit:
                 text, tone = fit, "bad"
             elif n >= FEWEST_POINTS:

@@ -199,27 +199,35 @@ def _refine_at(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array
     image, mask = blur(shown, sigma), blur(silhouette.mask, sigma)
     reach = max(image.shape) / 2
     for _ in range(_STEPS):
-        drawn = warp_plane(silhouette, offset, mask)
-        gx, gy = cv2.Sobel(drawn, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(drawn, cv2.CV_32F, 0, 1, scale=1 / 8)
-        steep = np.sqrt(gx * gx + gy * gy)
-        near = np.flatnonzero(steep > 0.02 * steep.max())
-        y, x = np.divmod(near, image.shape[1])
-        gx, gy, steep, drawn_near, image_near = (plane.ravel()[near] for plane in (gx, gy, steep, drawn, image))
-        r = image_near - (drawn_near + offset[4] * steep)
-        dx, dy = x - silhouette.middle[0] - offset[0], y - silhouette.middle[1] - offset[1]
-        J = np.stack([-gx, -gy, gx * dy - gy * dx, -gx * dx - gy * dy, steep])
-        weight = 1 / (1 + (r / _CLIP) ** 2) ** 2
-        H = (J * weight) @ J.T
-        H[np.diag_indices(5)] *= 1 + 1e-6
-        H[4, 4] += 1e-9
-        step = np.linalg.solve(H + 1e-9 * np.eye(5), (J * weight) @ r)
-        step[:2] = np.clip(step[:2], -3 * sigma, 3 * sigma)
-        step[2:4] = np.clip(step[2:4], -0.05, 0.05)
+        step = _refinement_step(silhouette, image, mask, offset, sigma=sigma)
         offset = offset + step
         offset[4] = np.clip(offset[4], -2, 2)
         if np.abs(step * [1, 1, reach, reach, 1]).max() < CONVERGED_PX:
             break
     return offset
+
+
+def _refinement_step(
+    silhouette: Silhouette, image: NDArray[np.float32], mask: NDArray[np.float32], offset: Array, *, sigma: float
+) -> Array:
+    """Return the step (5,) of least squares, no longer than the blur reaches."""
+    drawn = warp_plane(silhouette, offset, mask)
+    gx, gy = cv2.Sobel(drawn, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(drawn, cv2.CV_32F, 0, 1, scale=1 / 8)
+    steep = np.sqrt(gx * gx + gy * gy)
+    near = np.flatnonzero(steep > 0.02 * steep.max())
+    y, x = np.divmod(near, image.shape[1])
+    gx, gy, steep, drawn_near, image_near = (plane.ravel()[near] for plane in (gx, gy, steep, drawn, image))
+    r = image_near - (drawn_near + offset[4] * steep)
+    dx, dy = x - silhouette.middle[0] - offset[0], y - silhouette.middle[1] - offset[1]
+    J = np.stack([-gx, -gy, gx * dy - gy * dx, -gx * dx - gy * dy, steep])
+    weight = 1 / (1 + (r / _CLIP) ** 2) ** 2
+    H = (J * weight) @ J.T
+    H[np.diag_indices(5)] *= 1 + 1e-6
+    H[4, 4] += 1e-9
+    step = np.linalg.solve(H + 1e-9 * np.eye(5), (J * weight) @ r)
+    step[:2] = np.clip(step[:2], -3 * sigma, 3 * sigma)
+    step[2:4] = np.clip(step[2:4], -0.05, 0.05)
+    return step
 
 
 def warp_plane(silhouette: Silhouette, offset: Array, plane: NDArray[np.float32]) -> NDArray[np.float32]:

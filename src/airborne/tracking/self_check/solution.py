@@ -90,24 +90,28 @@ def solve(evidence: Evidence, wide: Array) -> tuple[NuisanceSolution, Array]:
     """
     is_seen = evidence.is_seen & ~_strays(evidence)
     weights = is_seen[..., None] / (3 * _LEAST_NOISE) ** 2
-    solution = _accumulate(evidence, weights)
-    trust = is_seen.astype(float)
+    solution, trust = _accumulate(evidence, weights), is_seen.astype(float)
     for _ in range(_ROUNDS):
-        theta = solution.posterior(wide)[0]
-        errors = pose_errors(evidence, weights)
-        residual = evidence.offset - np.einsum("ncak,k->nca", evidence.by_parameter, theta)
-        residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.at(theta))
-        residual *= is_seen[..., None]
-        inverse = np.linalg.inv(_pose_information(evidence, weights))
-        leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, inverse, evidence.by_twist, weights)
-        freedom = np.sum(trust[..., None] * (1 - leverage), axis=(0, 1))
-        noise = np.sqrt(np.sum(trust[..., None] * residual**2, axis=(0, 1)) / np.maximum(freedom, 1.0))
-        noise = np.maximum(noise, _LEAST_NOISE)
-        away = np.sqrt(np.mean((residual / noise) ** 2, axis=-1))
-        trust = is_seen * np.minimum(1, _CLIP / np.maximum(away, 1e-9)) ** 2
-        weights = trust[..., None] / noise**2
+        trust, weights = _weigh(evidence, weights, trust, theta=solution.posterior(wide)[0])
         solution = _accumulate(evidence, weights)
     return replace(solution, without=_without_blocks(evidence, weights)), weights
+
+
+def _weigh(evidence: Evidence, weights: Array, trust: Array, *, theta: Array) -> tuple[Array, Array]:
+    """Return how far each view is trusted at each moment (n, c), 0 where not seen, and its new weights (n, c, 4)."""
+    is_seen = trust > 0
+    errors = pose_errors(evidence, weights)
+    residual = evidence.offset - np.einsum("ncak,k->nca", evidence.by_parameter, theta)
+    residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.at(theta))
+    residual *= is_seen[..., None]
+    inverse = np.linalg.inv(_pose_information(evidence, weights))
+    leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, inverse, evidence.by_twist, weights)
+    freedom = np.sum(trust[..., None] * (1 - leverage), axis=(0, 1))
+    noise = np.sqrt(np.sum(trust[..., None] * residual**2, axis=(0, 1)) / np.maximum(freedom, 1.0))
+    noise = np.maximum(noise, _LEAST_NOISE)
+    away = np.sqrt(np.mean((residual / noise) ** 2, axis=-1))
+    trust = is_seen * np.minimum(1, _CLIP / np.maximum(away, 1e-9)) ** 2
+    return trust, trust[..., None] / noise**2
 
 
 def _without_blocks(evidence: Evidence, weights: Array) -> list[NuisanceSolution]:
