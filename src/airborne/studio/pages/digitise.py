@@ -10,7 +10,7 @@ from nicegui import ui
 from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.errors import AirborneError, count
-from airborne.evaluation import format_clicked_frames
+from airborne.evaluation import DigitisedPoints, format_clicked_frames
 from airborne.studio.clicks import Clicked
 from airborne.studio.digitising import (
     Repetition,
@@ -254,7 +254,7 @@ class DigitisePanel(PointsPanel):
         draft = self.session.draft(_DRAFT)
         return [name for name in draft if isinstance(name, str)] if isinstance(draft, list) else []
 
-    def _read(self):
+    def _read(self) -> DigitisedPoints:
         points = (*default_points(self.model), *self.extra)
         return read_digitising(self.session.file(self.file), self.shown.names, points)
 

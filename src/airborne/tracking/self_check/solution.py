@@ -104,8 +104,7 @@ def _weigh(evidence: Evidence, weights: Array, trust: Array, *, theta: Array) ->
     residual = evidence.offset - np.einsum("ncak,k->nca", evidence.by_parameter, theta)
     residual -= np.einsum("ncai,ni->nca", evidence.by_twist, errors.at(theta))
     residual *= is_seen[..., None]
-    inverse = np.linalg.inv(_pose_information(evidence, weights))
-    leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, inverse, evidence.by_twist, weights)
+    leverage = np.einsum("ncai,nij,ncaj,nca->nca", evidence.by_twist, errors.noise, evidence.by_twist, weights)
     freedom = np.sum(trust[..., None] * (1 - leverage), axis=(0, 1))
     noise = np.sqrt(np.sum(trust[..., None] * residual**2, axis=(0, 1)) / np.maximum(freedom, 1.0))
     noise = np.maximum(noise, _LEAST_NOISE)
