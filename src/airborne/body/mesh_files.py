@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,6 @@ from airborne.body.model import LONGEST_M, Mesh
 from airborne.errors import BodyError
 from airborne.io.text import read_bytes
 from airborne.types import Array
-
-if TYPE_CHECKING:
-    import trimesh
 
 logging.getLogger("trimesh").addHandler(logging.NullHandler())  # it would print a traceback for a damaged file
 _LARGEST_BYTES = 50_000_000  # larger files are refused
@@ -43,7 +40,7 @@ def read_mesh(path: Path, scale: float) -> Mesh:
     _check_size(path, _count_faces(kind, data))
     try:
         with np.errstate(all="ignore"):
-            mesh = trimesh.load_mesh(BytesIO(data), file_type=kind, skip_materials=True)
+            mesh: Any = trimesh.load_mesh(BytesIO(data), file_type=kind, skip_materials=True)
             bad, volume = _bad_edges(mesh), mesh.volume
             vertices, faces = np.asarray(mesh.vertices, float) * scale, np.asarray(mesh.faces, np.int64)
     except Exception as error:  # trimesh raises whatever its parsers raise
@@ -65,8 +62,8 @@ def read_mesh(path: Path, scale: float) -> Mesh:
     return Mesh(vertices, faces if volume >= 0 else faces[:, ::-1], note=note)
 
 
-def _bad_edges(mesh: trimesh.Trimesh) -> NDArray[np.integer]:
-    """Return the edges (n, 2), rows of the vertices, that do not have exactly two faces."""
+def _bad_edges(mesh: Any) -> NDArray[np.integer]:
+    """Return the edges (n, 2), rows of the vertices, without exactly two faces; `mesh` is a `trimesh.Trimesh`."""
     counts = np.bincount(mesh.edges_unique_inverse, minlength=len(mesh.edges_unique))
     return mesh.edges_unique[counts != 2]
 

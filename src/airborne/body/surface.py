@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,8 @@ def has_flat_sides(shape: Shape) -> bool:
         return isinstance(shape, Box)
     import trimesh  # here, as only meshes need it
 
-    angles = trimesh.Trimesh(shape.vertices_m, shape.faces).face_adjacency_angles
+    mesh: Any = trimesh.Trimesh(shape.vertices_m, shape.faces)  # its cached properties have no types
+    angles = mesh.face_adjacency_angles
     angles_at_edges = angles[angles > _FLAT_RAD]
     return bool(len(angles_at_edges) and np.all(angles_at_edges > _SHARP_RAD))
 
