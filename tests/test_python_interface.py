@@ -129,7 +129,7 @@ def test_the_study_holds_no_outputs():
     [
         (lambda: ab.synthesise("banana", "p"), "scene 'banana' is not known; choose cross or somersault or block"),
         (lambda: ab.smooth("results", "butterwort"), "choose butterworth or spline or kalman"),
-        (lambda: ab.read_run("results").plot("banana"), "choose pose or joints or flight"),
+        (lambda: ab.read_run("results").plot("banana"), "choose pose or joints or joint_status or flight"),
         (lambda: ab.Trial(name="x", camera=[]), "Trial: camera: holds 0 values, expected 1"),
         (lambda: ab.read_rig("calib.toml")["cam1"].px_from_world([0, 1]), "expected (..., 3)"),
         (lambda: ab.read_rig("calib.toml").points_from_px([0, 1]), "expected (..., 3, 2), a row a camera"),

@@ -4,6 +4,7 @@ import cv2
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from airborne.evaluation import DigitisedPoses, Truth
@@ -16,7 +17,15 @@ from airborne.export.error_figures import (
     write_digitised,
     write_errors,
 )
-from airborne.export.figures import write_figures, write_flight_figure, write_joints_figure, write_pose
+from airborne.export.figures import (
+    JOINT_COLOURS,
+    joint_status_figure,
+    write_figures,
+    write_flight_figure,
+    write_joints_figure,
+    write_pose,
+)
+from airborne.motion import JointStatus, joint_statuses, landmarks
 from airborne.motion.joints import main_joints
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 from tests.support.tolerances import ROUNDTRIP
@@ -146,10 +155,10 @@ def plotted(monkeypatch):
     "motion", [person_run(lost=(3,), unseen=(5,)), person_run(1), person_run(3, lost=(0, 1, 2))],
     ids=["mixed", "one frame", "all lost"],
 )  # fmt: skip
-def test_a_body_with_joints_and_masses_gets_two_more_figures(tmp_path, motion):
+def test_a_body_with_joints_and_masses_gets_three_more_figures(tmp_path, motion):
     write_figures(tmp_path, motion, PERSON)
     names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == ["flight.png", "joints.png", "pose.png", "score.png"]
+    assert names == ["flight.png", "joint_status.png", "joints.png", "pose.png", "score.png"]
     for name in names:
         assert cv2.imread(str(tmp_path / name)).shape[1] == panels.WIDTH_IN * panels.DPI
 
@@ -157,7 +166,8 @@ def test_a_body_with_joints_and_masses_gets_two_more_figures(tmp_path, motion):
 def test_joints_without_masses_get_no_flight(tmp_path):
     weightless = replace(PERSON, segments=tuple(replace(segment, inertia=None) for segment in PERSON.segments))
     write_figures(tmp_path, person_run(), weightless)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["joints.png", "pose.png", "score.png"]
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["joint_status.png", "joints.png", "pose.png", "score.png"]
 
 
 def test_flexion_is_positive_in_every_joint_plotted(tmp_path, plotted):
@@ -173,6 +183,21 @@ def test_an_unobservable_joint_is_marked(tmp_path):
     write_joints_figure(tmp_path / "seen.png", person_run(), PERSON)
     write_joints_figure(tmp_path / "unseen.png", person_run(unseen=(5, 6)), PERSON)
     assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
+
+
+def test_the_status_of_each_joint_is_drawn_over_the_whole_run():
+    motion = person_run(lost=(3,), unseen=(5,))
+    (axes,) = joint_status_figure(motion, PERSON).axes
+    status = joint_statuses(motion, PERSON, landmarks(motion, PERSON)[1])
+    period_s, drawn_s = motion.time_s[1] - motion.time_s[0], {}
+    for bars in axes.collections:
+        (colour,) = {to_hex(each) for each in bars.get_facecolor()} or {None}
+        widths_s = sum(np.ptp(path.vertices[:, 0]) for path in bars.get_paths())
+        drawn_s[colour] = drawn_s.get(colour, 0.0) + widths_s
+    for each in JointStatus:
+        expected_s = np.sum(status == each.value) * period_s
+        assert drawn_s.get(JOINT_COLOURS[each], 0.0) == pytest.approx(expected_s), each
+    assert [text.get_text() for text in axes.get_yticklabels()] == [mark.name for mark in PERSON.landmarks]
 
 
 def test_the_legend_lies_within_the_figure_however_much_it_has_to_say(tmp_path, monkeypatch):

@@ -98,7 +98,7 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
         "a free fall [mm]",
     )
     assert [word for word in words if word not in html] == []
-    assert html.count("<img") == 4
+    assert html.count("<img") == 5
     (tmp_path / "rigid").mkdir()
     write_figures(figures_of(tmp_path / "rigid"), run(), BOX)
     assert [word for word in words if word in html_of(tmp_path / "rigid", run())] == []

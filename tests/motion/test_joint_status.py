@@ -7,6 +7,7 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.body import Pose, human18
 from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
+from airborne.motion.joints import count_statuses
 from airborne.tracking import Estimate, Status
 
 HUMAN = human18()
@@ -44,6 +45,15 @@ def motion(n=5, *, sd_rad=0.01, status=Status.TRACKED, wide=None, knee_deg=None)
 
 def statuses(of_motion, name):
     return joint_statuses(of_motion, HUMAN, landmarks(of_motion, HUMAN)[1])[:, NAMES.index(name)].tolist()
+
+
+def test_each_joint_is_counted():
+    run = motion(n=4, wide={"foot_left": np.inf})
+    counts = count_statuses(joint_statuses(run, HUMAN, landmarks(run, HUMAN)[1]), HUMAN)
+    assert list(counts) == NAMES
+    assert all(sum(of_joint.values()) == 4 for of_joint in counts.values())
+    assert counts["hip_left"] == {"tracked": 4, "uncertain": 0, "unknown": 0, "lost": 0}
+    assert counts["foot_left"] == {"tracked": 0, "uncertain": 0, "unknown": 4, "lost": 0}
 
 
 def test_joints_with_small_deviations_are_tracked():

@@ -56,6 +56,11 @@ def test_flight_needs_masses(tmp_path, monkeypatch):
         _ = run_of(tmp_path, monkeypatch, box_run(), BOX).flight
 
 
+def test_statuses_of_joints_are_drawn(tmp_path, monkeypatch):
+    (axes,) = run_of(tmp_path, monkeypatch, person_run(), PERSON).plot("joint_status").axes
+    assert len(axes.get_yticklabels()) == len(PERSON.landmarks)
+
+
 @pytest.mark.parametrize("what", ["pose", "joints", "flight"])
 def test_curves_are_drawn(tmp_path, monkeypatch, what):
     figure = run_of(tmp_path, monkeypatch, person_run(), PERSON).plot(what)

@@ -1,6 +1,6 @@
 """The figures of a run over time: pose.png and score.png.
 
-For a body with joints also joints.png, and flight.png where every segment has a mass.
+For a body with joints also joints.png and joint_status.png, and flight.png where every segment has a mass.
 """
 
 from __future__ import annotations
@@ -9,28 +9,47 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from airborne.body import BodyModel
 from airborne.errors import ResultError
 from airborne.export import panels
+from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.io.figures import save_png
-from airborne.motion import Motion, has_inertias, joint_angles, measure_flight, root_angles
+from airborne.motion import (
+    JointStatus,
+    Motion,
+    has_inertias,
+    joint_angles,
+    joint_statuses,
+    landmarks,
+    measure_flight,
+    root_angles,
+)
 from airborne.motion.joints import main_joints
+from airborne.tracking import Status
 
 _AXIS_STYLES = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
+JOINT_COLOURS = {
+    JointStatus.TRACKED: hex_colour(STATUS_RGB[Status.TRACKED]),
+    JointStatus.UNCERTAIN: hex_colour(STATUS_RGB[Status.UNCERTAIN]),
+    JointStatus.UNKNOWN: hex_colour(STATUS_RGB[Status.LOST]),
+    JointStatus.LOST: panels.LOST_STYLE["facecolor"],
+}
 _TWO_SD = "± 2 standard deviations; unseen where thinner than the line"
 
 
 def write_figures(folder: Path, motion: Motion, model: BodyModel) -> None:
     """Write every figure that the data allow into a run's folder; those against a reference are in `error_figures`.
 
-    Always pose.png and score.png; joints.png and flight.png where the body has joints and masses. Raises ResultError
-    where the motion is another body's.
+    Always pose.png and score.png; joints.png and joint_status.png where the body has joints, flight.png where it has
+    masses too. Raises ResultError where the motion is another body's.
     """
     write_pose(folder / "pose.png", motion)
     write_score(folder / "score.png", motion)
     if motion.joints:
         write_joints_figure(folder / "joints.png", motion, model)
+        save_png(joint_status_figure(motion, model), folder / "joint_status.png")
     if motion.joints and has_inertias(model):
         write_flight_figure(folder / "flight.png", motion, model)
 
@@ -128,6 +147,28 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         *panels.singular_handles(singular, "y near ±90°: x and z mix"),
     ]
     return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD), *handles])
+
+
+def joint_status_figure(motion: Motion, model: BodyModel) -> Figure:
+    """Draw the status of each landmark over time, see `joint_statuses`, a row for each.
+
+    Raises ResultError where the motion is another body's.
+    """
+    status = joint_statuses(motion, model, landmarks(motion, model)[1])
+    figure, ((axes,),) = panels.panel_figure(1, 1, row_in=0.16 * len(model.landmarks) + 0.5)
+    for row, column in enumerate(status.T):
+        for each, colour in JOINT_COLOURS.items():
+            spans = [(a, b - a) for a, b in panels.intervals(motion.time_s, column == each.value)]
+            axes.broken_barh(spans, (row - 0.4, 0.8), facecolors=colour)
+    axes.set_yticks(range(len(model.landmarks)), [landmark.name for landmark in model.landmarks])
+    axes.invert_yaxis()
+    axes.grid(False)
+    handles = [
+        Patch(color=colour, label=f"{each} ({n})")
+        for each, colour in JOINT_COLOURS.items()
+        if (n := int(np.sum(status == each.value)))
+    ]
+    return panels.draw_legend(figure, handles)
 
 
 def write_flight_figure(path: Path, motion: Motion, model: BodyModel) -> None:

@@ -70,7 +70,7 @@ def shade_lost(axes: Axes, motion: Motion) -> None:
 
 def shade_spans(axes: Axes, time_s: Array, mask: Mask, style: dict) -> None:
     """Shade the intervals of time (n,) where `mask` (n,) is true."""
-    for start_s, stop_s in _intervals(time_s, mask):
+    for start_s, stop_s in intervals(time_s, mask):
         axes.axvspan(start_s, stop_s, zorder=0, **style)
 
 
@@ -97,7 +97,11 @@ def add_legend(figure: Figure, motion: Motion, extra: Sequence[Artist] = ()) -> 
     ]  # fmt: skip
     if counts[Status.LOST]:
         handles.append(Patch(**LOST_STYLE, label=f"lost ({counts[Status.LOST]})"))
-    handles += extra
+    return draw_legend(figure, [*handles, *extra])
+
+
+def draw_legend(figure: Figure, handles: Sequence[Artist]) -> Figure:
+    """Add a legend on top."""
     fits = sum(len(str(handle.get_label())) for handle in handles) <= _LEGEND_CHARACTERS
     figure.legend(
         handles=handles, loc="outside upper center", ncols=4 if fits else 2, fontsize=FONT_PT - 1, frameon=False,
@@ -132,7 +136,8 @@ def singular_handles(singular: Mask, label: str = "tilt near ±90°: somersault 
     return [Patch(**SINGULAR_STYLE, label=label)] if singular.any() else []
 
 
-def _intervals(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:
+def intervals(time_s: Array, mask: Mask) -> Iterator[tuple[float, float]]:
+    """Yield begin and end of the intervals of time (n,) [s] where `mask` (n,) is true, half a frame around each."""
     half_s = float(np.median(np.diff(time_s))) / 2 if len(time_s) > 1 else 0.5
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
     for first, stop in edges.reshape(-1, 2):

@@ -40,6 +40,11 @@ _FIGURES = {  # titles and captions, in the order of the page
         "How the main joints are bent over time. Of a person: flexion is positive, and zero is standing upright with "
         "hanging arms. Of another body: the x angles. Turns about the other axes are in joint_angles.csv.",
     ),
+    "joint_status.png": (
+        "How far each joint can be trusted",
+        "The status of each joint over time. Tracked: its interval can be trusted. Uncertain: it may be elsewhere. "
+        "Unknown: the images do not show it, and its position is a guess.",
+    ),
     "flight.png": (
         "Centre of mass and angular momentum",
         "Height of the centre of mass, and the angular momentum about it in world axes. In free flight the height is a "
@@ -116,6 +121,7 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     - `cameras`: one dictionary for each camera, with `name` first
     - `truth`: `MotionComparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints` and
       `smooth_joints`: `JointComparison.to_dict()`
+    - `joint_statuses`: by landmark, then by status, in how many frames; see `count_statuses`
     - `self_check`: what the pictures say against the files, see `Finding.to_dict`
     - `flight`: `FlightSummary.to_dict()`
 

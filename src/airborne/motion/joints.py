@@ -99,6 +99,14 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
     return status
 
 
+def count_statuses(status: NDArray[np.str_], model: BodyModel) -> dict[str, dict[str, int]]:
+    """Count in how many frames each landmark has each status, of `joint_statuses`: by landmark, then by status."""
+    return {
+        landmark.name: {each.value: int(np.sum(status[:, k] == each.value)) for each in JointStatus}
+        for k, landmark in enumerate(model.landmarks)
+    }
+
+
 def _carriers(model: BodyModel) -> NDArray[np.int64]:
     """Return the segment whose joint moves each landmark, the parent of a segment for its origin: (landmarks,)."""
     owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])

@@ -83,17 +83,19 @@ def write_angles(path: Path, motion: Motion) -> None:
     _write_csv(path, columns | {"is_singular": angles.is_singular.astype(int)})
 
 
-def write_joints(path: Path, motion: Motion, model: BodyModel) -> None:
-    """Write joints.csv, long: one row per frame and landmark; empty cells where lost.
+def write_joints(path: Path, motion: Motion, model: BodyModel) -> NDArray[np.str_]:
+    """Write joints.csv, long: one row per frame and landmark; empty cells where lost. Return each one's status.
 
     `sd_m` is the root mean square, over the three axes, of the point's standard deviations, propagated from the
     covariance through every joint that moves it; infinite where a direction that moves it is unobserved. `status` is
-    the joint's own: see `joint_statuses`.
+    the joint's own, (n, landmarks): see `joint_statuses`.
     """
     points, sd = landmarks(motion, model)
+    status = joint_statuses(motion, model, sd)
     names = np.array([landmark.name for landmark in model.landmarks])
     columns = _long(motion, names) | {f"{axis}_m": points[..., k].ravel() for k, axis in enumerate("xyz")}
-    _write_csv(path, columns | {"sd_m": sd.ravel(), "status": joint_statuses(motion, model, sd).ravel()})
+    _write_csv(path, columns | {"sd_m": sd.ravel(), "status": status.ravel()})
+    return status
 
 
 def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:

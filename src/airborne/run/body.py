@@ -19,24 +19,9 @@ from airborne.body_fitting.landmark_places import place_landmarks
 from airborne.calibration.from_points import Calibration
 from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
-from airborne.motion import (
-    Motion,
-    MotionWriter,
-    flight_summary,
-    read_estimates,
-    read_motion,
-    revise_motion,
-    sort_rows,
-)
+from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
-from airborne.motion.run_folder import (
-    BODY,
-    MOTION,
-    TRACKED_MOTION,
-    figures_of,
-    tables_of,
-    videos_of,
-)
+from airborne.motion.run_folder import BODY, MOTION, TRACKED_MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
 from airborne.run.body_passes import BodyPasses
 from airborne.run.body_tables import write_tables
@@ -171,9 +156,12 @@ class BodyRun:
         tick: Callable[[int], None],
     ) -> Iterator[tuple[Frames, Estimate]]:
         """Yield each time's frames with the body's estimate there, written: from the start on, then back from it."""
-        passes = BodyPasses(self.trial, self.recording, self.model, self.start, self.keys)
-        yield from passes.track(frames, write, done, tick)
-        yield from passes.track_earlier(write, done)
+        yield from self._passes.track(frames, write, done, tick)
+        yield from self._passes.track_earlier(write, done)
+
+    @property
+    def _passes(self) -> BodyPasses:
+        return BodyPasses(self.trial, self.recording, self.model, self.start, self.keys)
 
     def writer(self, folder: Path, *, resume: bool) -> MotionWriter:
         """Return what writes the estimates."""
@@ -245,7 +233,7 @@ class BodyRun:
         revise_motion(folder / self.table, motion)
         if checked.found is not None:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
-        flight = write_tables(folder, motion, model)
+        measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, progress_of("drawing"))
         self.recording.events.extend(checked.doubts)
@@ -253,7 +241,8 @@ class BodyRun:
         return motion, {
             "name": self.trial.name,
             **headline(motion),
-            **({} if flight is None else {"flight": flight_summary(motion, flight).to_dict()}),
+            **({} if measured.joint_statuses is None else {"joint_statuses": measured.joint_statuses}),
+            **({} if measured.flight is None else {"flight": flight_summary(motion, measured.flight).to_dict()}),
             **({} if fitted is None else {"whole_run": fitted.surface}),
             "self_check": checked.findings,
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
@@ -264,8 +253,7 @@ class BodyRun:
         """Fit the whole run; what the tracker found stays beside it, for a run that is resumed and for a comparison."""
         estimates, reader = read_estimates(folder / self.table), Rereading(self.recording)
         args = reader, self.trial.settings, self.model, motion, estimates
-        is_joined = self.trial.directions == "both" and not self.keys
-        fitted = fit_whole_run(*args, keys=self.keys, is_joined=is_joined, progress=progress)
+        fitted = fit_whole_run(*args, keys=self.keys, is_joined=self._passes.is_joined, progress=progress)
         if fitted is not None:
             tables_of(folder)
             copy_motion(folder / self.table, folder / TRACKED_MOTION)

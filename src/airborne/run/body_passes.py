@@ -27,6 +27,11 @@ class BodyPasses:
     start: Pose
     keys: Mapping[int, PoseEvidence]  # of later frames, in the order of time
 
+    @property
+    def is_joined(self) -> bool:
+        """Whether a limb lies where the images of the whole run are likelier, of both directions."""
+        return self.trial.directions == "both" and not self.keys
+
     def track(
         self, frames: Iterable[Frames], write: Write, done: Mapping[int, Estimate], tick: Callable[[int], None]
     ) -> Tracked:
@@ -58,6 +63,6 @@ class BodyPasses:
         tick: Callable[[int], None] = lambda n_done: None,
     ) -> Tracked:
         tracker = tracker_of(self.trial.settings, self.model, self.start, self.keys)
-        if self.trial.directions == "forward" or not tracker.moves_joints:
-            return track_frames(tracker, frames, write, done)
-        return track_forward_backward(tracker, self.model, frames, write=write, done=done, tick=tick)
+        if self.trial.directions == "both" and tracker.moves_joints:
+            return track_forward_backward(tracker, self.model, frames, write=write, done=done, tick=tick)
+        return track_frames(tracker, frames, write, done)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from airborne.body import BodyModel
 from airborne.motion import (
@@ -16,25 +16,30 @@ from airborne.motion import (
     write_joints,
     write_motion_parquet,
 )
+from airborne.motion.joints import count_statuses
 from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, JOINTS, tables_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def write_tables(folder: Path, motion: Motion, model: BodyModel) -> xr.Dataset | None:
-    """Write what is made of a motion: the same as parquet, angles, joints, the flight; return the flight's table.
+class Measured(NamedTuple):
+    """What a summary takes from the tables."""
 
-    A flight is measured of a body with joints whose masses are known.
-    """
+    joint_statuses: dict[str, dict[str, int]] | None  # of `count_statuses`; None of a body without joints
+    flight: xr.Dataset | None  # of `measure_flight`; None without joints or masses
+
+
+def write_tables(folder: Path, motion: Motion, model: BodyModel) -> Measured:
+    """Write what is made of a motion: the same as parquet, angles, joints, the flight."""
     tables = tables_of(folder)
-    write_joints(folder / JOINTS, motion, model)
+    status = write_joints(folder / JOINTS, motion, model)
     write_motion_parquet(tables / "motion.parquet", motion)
     write_angles(folder / ANGLES, motion)
-    if motion.joints:
-        write_joint_angles(folder / JOINT_ANGLES, motion, model)
-    if not (motion.joints and has_inertias(model)):
-        return None
-    flight = measure_flight(motion, model)
-    write_flight(folder / FLIGHT, motion, flight)
-    return flight
+    if not motion.joints:
+        return Measured(None, None)
+    write_joint_angles(folder / JOINT_ANGLES, motion, model)
+    flight = measure_flight(motion, model) if has_inertias(model) else None
+    if flight is not None:
+        write_flight(folder / FLIGHT, motion, flight)
+    return Measured(count_statuses(status, model), flight)

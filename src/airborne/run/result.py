@@ -13,13 +13,13 @@ from matplotlib.figure import Figure
 from airborne.body import BodyModel
 from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError, ResultError, require_choice
-from airborne.export.figures import flight_figure, joints_figure, pose_figure
+from airborne.export.figures import flight_figure, joint_status_figure, joints_figure, pose_figure
 from airborne.export.players_report import heights_figure
 from airborne.motion import Motion, PlayersMotion, measure_flight, measure_jumps
 from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players, label_root
 from airborne.motion.run_folder import holds_players, read_body_run, read_players_run, read_summary
 
-_FIGURES = {"joints": joints_figure, "flight": flight_figure}
+_FIGURES = {"joints": joints_figure, "joint_status": joint_status_figure, "flight": flight_figure}
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +119,8 @@ class Run:
         """The jumps of players (jump): the columns of jumps.csv; `x` has the 95 % interval `x_low`, `x_high`."""
         return label_jumps(measure_jumps(self.players))
 
-    def plot(self, what: Literal["pose", "joints", "flight"] = "pose") -> Figure:
-        """Draw curves over time with bands of two standard deviations.
+    def plot(self, what: Literal["pose", "joints", "joint_status", "flight"] = "pose") -> Figure:
+        """Draw curves over time with bands of two standard deviations, or the status of each joint.
 
         Of a body its pose, or the angles of its joints, or its flight; of players the heights of hips, knees and
         ankles.
