@@ -11,13 +11,12 @@ import tomllib
 from dataclasses import fields
 
 import pytest
-import typer
 from typer.testing import CliRunner
 
 from airborne.body import files as bodies
 from airborne.body.files import read_body
 from airborne.body.human import BALL_LIMITS_DEG, HINGE_LIMITS_DEG, PARENTS
-from airborne.cli import app
+from airborne.cli import app, command_tree
 from airborne.evaluation import PlayerErrors, PlayersComparison
 from airborne.evaluation.jump_errors import JumpErrors
 from airborne.evaluation.players import PartErrors
@@ -48,7 +47,7 @@ DOCS = ROOT / "docs"
 RESULTS = DOCS / "reference" / "results.md"
 TRIAL = DOCS / "reference" / "trial.md"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
-TREE = typer.main.get_command(app)
+TREE = command_tree()
 LARGEST_IMAGES_BYTES = 700_000
 
 

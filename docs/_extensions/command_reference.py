@@ -6,9 +6,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Literal, Union, get_args, get_origin, get_type_hints
 
-import typer
-
-from airborne.cli import app as commands
+from airborne.cli import command_tree
 
 PAGE = "reference/commands"
 
@@ -21,7 +19,7 @@ def setup(app):
 
 def _add(app, name, source):
     if name == PAGE:
-        source[0] += "\n\n" + "\n\n".join(sections(typer.main.get_command(commands), "airborne"))
+        source[0] += "\n\n" + "\n\n".join(sections(command_tree(), "airborne"))
 
 
 def sections(command, name):

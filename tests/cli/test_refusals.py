@@ -5,9 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-import typer
 
-from airborne.cli import app
+from airborne.cli import command_tree
 from tests.support.commands import in_process, refusal
 from tests.support.example_trial import CALIBRATED, SHORT, edit_trial
 
@@ -154,5 +153,5 @@ def test_the_help_names_each_command_once_below_a_step_of_the_work(capsys):
     assert in_process("--help") == 0
     lines = capsys.readouterr().out.splitlines()
     named = [line.split()[0] for line in lines if line.startswith("  ") and not line.startswith((" " * 4, "  -"))]
-    assert sorted(named[1:]) == sorted(vars(typer.main.get_command(app))["commands"])
+    assert sorted(named[1:]) == sorted(vars(command_tree())["commands"])
     assert lines.index("Cameras:") < lines.index("Track:") < lines.index("Results:")

@@ -48,13 +48,15 @@ def delta_between(earlier: Pose, later: Pose) -> Array:
 
 def clamp_to_limits(model: BodyModel, pose: Pose) -> Pose:
     """Return the pose with every joint clamped to its limits; joints within are left as they are, bit for bit."""
-    if not pose.joint_angles.size:
-        return pose
-    R = matrix_from_angles(pose.joint_angles)
+    return replace(pose, joint_angles=clamp_angles(model, pose.joint_angles)) if pose.joint_angles.size else pose
+
+
+def clamp_angles(model: BodyModel, angles: Array) -> Array:
+    """Return joint angles (..., joints, 3) [rad] within the joints' limits; those within are left as they are."""
+    R = matrix_from_angles(angles)
     clamped = model.limits.clamp(R)
-    is_out = np.any(clamped != R, axis=(1, 2))
-    angles = np.where(is_out[:, None], angles_near(clamped, pose.joint_angles), pose.joint_angles)
-    return replace(pose, joint_angles=angles)
+    is_out = np.any(clamped != R, axis=(-2, -1))
+    return np.where(is_out[..., None], angles_near(clamped, angles), angles)
 
 
 def joint_angles_of(model: BodyModel, R: Array, near: Array | None = None) -> Array:

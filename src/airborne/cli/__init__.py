@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import signal
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -89,13 +90,19 @@ app.add_typer(_group(_SYNTH, "Write a synthetic trial with its truth."), name="s
 app.add_typer(_group(_REPRODUCE, "Repeat a paper's experiment: its table beside ours."), name="reproduce")
 
 
+@cache
+def command_tree() -> Any:
+    """Return the commands as Typer runs them, made once: that takes as long as many a command does."""
+    return typer.main.get_command(app)
+
+
 def main() -> None:
     """Run the command line; a user's error is one line on stderr and exit code 2."""
     set_up_libraries()
     show_notes()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a scheduler's stop is as orderly as Ctrl-C
     try:
-        code = app(standalone_mode=False)
+        code = command_tree()(standalone_mode=False)
         if code == STOPPED:  # typer's answer to Ctrl-C
             stop()
         sys.exit(code)

@@ -15,7 +15,7 @@ from scipy.special import ndtri
 
 from airborne.appearance.model import Region
 from airborne.body import BodyModel, Pose
-from airborne.body.chain import clamp_to_limits, joint_angles_of, move_pose
+from airborne.body.chain import clamp_angles, clamp_to_limits, joint_angles_of
 from airborne.body.limits import JointLimits
 from airborne.geometry.joint_rotations import compose_rotation_vectors
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles, super_fibonacci
@@ -118,12 +118,20 @@ def polish(judge: Judge, pose: Pose, seed: int = 0) -> Pose:
         sd = np.repeat([_POLISH_SD_M, _POLISH_SD_RAD], [3, n_dofs - 3]) * 0.85**number
         is_moved = np.repeat(rng.random((_N_SMALL, n_dofs // 3)) < _SHARE_MOVED, 3, axis=1)
         deltas = rng.normal(0, sd, (_N_SMALL, n_dofs)) * is_moved
-        tried = PoseSet.of([clamp_to_limits(person.model, move_pose(best.each()[0], delta)) for delta in deltas])
+        tried = _move(person.model, best, deltas)
         tried = tried[np.argsort(-judge.shares(tried), kind="stable")[:_N_JUDGED]]
         values = judge(tried)
         if values.max() > best_value:
             best, best_value = tried[values.argmax() : values.argmax() + 1], values.max()
     return best.each()[0]
+
+
+def _move(model: BodyModel, pose: PoseSet, deltas: Array) -> PoseSet:
+    """Change one pose in many ways, as `move_pose` does: deltas (n, 6 + 3 joints); joints keep their limits."""
+    R = Rotation.from_rotvec(deltas[:, 3:6]).as_matrix() @ pose.R
+    angles = np.tile(pose.angles, (len(deltas), 1, 1))
+    turned = compose_rotation_vectors(angles.reshape(-1, 3), deltas[:, 6:].reshape(-1, 3)).reshape(angles.shape)
+    return PoseSet(R, pose.t + deltas[:, :3], clamp_angles(model, turned))
 
 
 def _pose_library(person: JointedBody, silhouettes: SilhouetteEvidence, at: Array) -> PoseSet:

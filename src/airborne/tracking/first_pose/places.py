@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from airborne.types import Array
 
 _LEAST_SHARE = 1e-4  # of the picture that a region covers
 _MOST_REGIONS = 6  # of a view, the largest
+_NEAREST_M = 0.1  # to a camera that sees a place
 _APART = 0.7  # body radii by which rays of one body's regions may miss each other
 
 
@@ -49,13 +51,14 @@ def find_places(moment: Moment, radius_m: float) -> list[Place]:
         [] if view is None or nats is None else _regions(view.camera, nats)
         for view, nats in zip(moment.frames.views, moment.evidence, strict=True)
     ]
+    seen = [view for view, own in enumerate(regions) if own]
+    rig = Rig(tuple(regions[view][0].camera for view in seen))
+    centres = [np.array([region.centre for region in regions[view]]) for view in seen]
     found: list[Place] = []
-    for a, b in combinations(range(len(regions)), 2):
-        for first in regions[a]:
-            for second in regions[b]:
-                place = _match(regions, {a: first, b: second}, radius_m)
-                if place is not None:
-                    found.append(place)
+    for pair in combinations(range(len(seen)), 2):
+        for position, chosen in zip(*_match(rig, centres, pair, _APART * radius_m), strict=True):
+            of_view = {seen[k]: regions[seen[k]][region] for k, region in enumerate(chosen) if region >= 0}
+            found.append(Place(position, tuple(of_view.get(view) for view in range(len(regions)))))
     found.sort(key=lambda place: place.rank, reverse=True)
     apart: list[Place] = []
     for place in found:
@@ -64,36 +67,39 @@ def find_places(moment: Moment, radius_m: float) -> list[Place]:
     return apart
 
 
-def _match(regions: list[list[MovingRegion]], pair: dict[int, MovingRegion], radius_m: float) -> Place | None:
-    """Triangulate two regions and take the nearest one of every other view; None where their rays do not meet."""
-    chosen = dict(pair)
-    position = _triangulate(chosen)
-    if position is None or any(_distance_m(region, position) > _APART * radius_m for region in pair.values()):
-        return None
-    for view, others in enumerate(regions):
-        if view not in pair and others:
-            nearest = min(others, key=lambda region: _distance_m(region, position))
-            if _distance_m(nearest, position) < _APART * radius_m:
-                chosen[view] = nearest
-    refined = _triangulate(chosen)
-    if refined is None:
-        return None
-    return Place(refined, tuple(chosen.get(view) for view in range(len(regions))))
+def _match(rig: Rig, centres: Sequence[Array], pair: tuple[int, int], reach_m: float) -> tuple[Array, NDArray[np.intp]]:
+    """Triangulate each two regions of two views with the nearest one of every other view, where their rays meet.
+
+    centres (regions, 2) [px] of each camera. Return the points (n, 3) world [m], and which region of each camera
+    (n, cameras) belongs to them, -1 where none lies within reach.
+    """
+    chosen = np.full((len(centres[pair[0]]) * len(centres[pair[1]]), len(rig)), -1)
+    chosen[:, pair] = list(product(*(range(len(centres[view])) for view in pair)))
+    points = _triangulate(rig, centres, chosen)
+    does_meet = np.isfinite(points).all(axis=1)
+    for view, (camera, own) in enumerate(zip(rig, centres, strict=True)):
+        off_m = _distances_m(camera, own, points)
+        if view in pair:
+            does_meet &= np.take_along_axis(off_m, chosen[:, view, None], axis=1)[:, 0] <= reach_m
+        else:
+            chosen[:, view] = np.where(off_m.min(axis=1) < reach_m, off_m.argmin(axis=1), -1)
+    refined = _triangulate(rig, centres, chosen)
+    is_place = does_meet & np.isfinite(refined).all(axis=1)
+    return refined[is_place], chosen[is_place]
 
 
-def _triangulate(chosen: dict[int, MovingRegion]) -> Array | None:
-    rig = Rig(tuple(region.camera for region in chosen.values()))
-    position = rig.points_from_px(np.stack([region.centre for region in chosen.values()]))
-    return position if np.isfinite(position).all() else None
+def _triangulate(rig: Rig, centres: Sequence[Array], chosen: NDArray[np.intp]) -> Array:
+    """Triangulate the chosen regions (n, cameras), -1 for none: (n, 3) [m], NaN where rays do not meet."""
+    px = [np.where(of_view[:, None] < 0, np.nan, own[of_view]) for own, of_view in zip(centres, chosen.T, strict=True)]
+    return rig.points_from_px(np.stack(px, axis=1))
 
 
-def _distance_m(region: MovingRegion, position: Array) -> float:
-    """Return how far a point lies beside a region's middle, at the point's depth; infinite behind the camera."""
-    depth_m = float(region.camera.camera_from_world.apply(position)[2])
-    if depth_m <= 0.1:
-        return np.inf
-    focal = np.array([region.camera.K[0, 0], region.camera.K[1, 1]])
-    return float(np.linalg.norm((region.camera.px_from_world(position) - region.centre) / focal) * depth_m)
+def _distances_m(camera: Camera, centres: Array, points: Array) -> Array:
+    """Return how far points lie beside regions' middles, at the points' depth (points, regions); infinite behind."""
+    depth_m = camera.camera_from_world.apply(points)[:, 2]
+    off_px = camera.px_from_world(points)[:, None] - centres
+    off_m = np.linalg.norm(off_px / np.diag(camera.K)[:2], axis=-1) * depth_m[:, None]
+    return np.where(depth_m[:, None] > _NEAREST_M, off_m, np.inf)
 
 
 def _regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
