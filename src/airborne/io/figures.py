@@ -12,8 +12,11 @@ from airborne.io.writing import explain_full_disk
 
 
 def save_png(figure: Any, path: Path, **options: Any) -> None:
-    """Write a Matplotlib figure as PNG."""
+    """Write a Matplotlib figure as PNG. It is laid out once: `savefig` would do so before and while it draws."""
     with explain_full_disk(path), any_letters():
+        if (layout := figure.get_layout_engine()) is not None:
+            layout.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(path, **options)
 
 
