@@ -55,17 +55,14 @@ def surface_arrays(model: BodyModel) -> SurfaceArrays:
     part_index = 0
     for segment_index, segment in enumerate(model.segments):
         for part in segment.parts:
-            segment_from_part = part.segment_from_part
-            ids = (segment_index, part_index)
+            matrix = part.segment_from_part.as_matrix()
+            axes, ids = matrix[:3, :3], (segment_index, part_index)
             if isinstance(part.shape, Ellipsoid):
-                axes = segment_from_part.rotation.as_matrix()
-                ellipsoids.append((*ids, segment_from_part.translation, axes, part.shape.semi_axes_m, part.slab_m))
+                ellipsoids.append((*ids, matrix[:3, 3], axes, part.shape.semi_axes_m, part.slab_m))
             else:
                 loops, normals = _polygons(part.shape)
-                loops = segment_from_part.apply(loops.reshape(-1, 3)).reshape(loops.shape)
-                polygons.append(
-                    (*ids, loops, None if normals is None else normals @ segment_from_part.rotation.as_matrix().T)
-                )
+                loops = part.segment_from_part.apply(loops.reshape(-1, 3)).reshape(loops.shape)
+                polygons.append((*ids, loops, None if normals is None else normals @ axes.T))
             part_index += 1
     counts = [len(p[2]) for p in polygons]
     sizes = np.repeat([p[2].shape[1] for p in polygons], counts).astype(np.int64)

@@ -61,7 +61,8 @@ class Camera:
         points = np.asarray(points, float)
         if points.shape[-1:] != (3,):
             raise CalibrationError(f"points have the shape {points.shape}; expected (..., 3): x, y, z in metres")
-        xyz = points @ self.camera_from_world.rotation.as_matrix().T + self.camera_from_world.translation
+        matrix = self.camera_from_world.as_matrix()
+        xyz = points @ matrix[:3, :3].T + matrix[:3, 3]
         z = np.where(xyz[..., 2:] > 0, xyz[..., 2:], np.nan)
         return self._distort(xyz[..., :2] / z) @ self.K[:2, :2].T + self.K[:2, 2]
 

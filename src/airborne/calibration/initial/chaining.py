@@ -215,18 +215,20 @@ def pose_by_link(
         (a, b, m) for m, (a, b) in enumerate(zip(poses, other_poses, strict=True)) if a is not None and b is not None
     ]
     candidates = [a * b.inv() for a, b, _ in shared]
+    matrices = np.stack([candidate.as_matrix() for candidate in candidates])
     at_origin = replace(one, camera_from_world=_IDENTITY)
 
-    def misfit(candidate: RigidTransform) -> float:
-        distances = []
-        for _, b, m in shared:
-            sighting = views.detections[pair[0]][m]
-            projected = at_origin.px_from_world((candidate * b).apply(views.board.corners[sighting.corner]))
-            distances.append(np.median(np.nan_to_num(np.linalg.norm(projected - sighting.px, axis=1), nan=1e6)))
-        return float(np.median(distances))
+    def distances_px(other_from_board: RigidTransform, moment: int) -> Array:
+        """Return the median distance of a moment's corners for each candidate: (n,)."""
+        sighting = views.detections[pair[0]][moment]
+        points = other_from_board.apply(views.board.corners[sighting.corner])
+        in_one = points @ np.swapaxes(matrices[:, :3, :3], 1, 2) + matrices[:, None, :3, 3]
+        off_px = np.linalg.norm(at_origin.px_from_world(in_one) - sighting.px, axis=-1)
+        return np.median(np.nan_to_num(off_px, nan=1e6), axis=1)
 
-    best = min(candidates, key=misfit)
-    return best, misfit(best)
+    misfits = np.median([distances_px(b, moment) for _, b, moment in shared], axis=0)
+    best = int(np.argmin(misfits))
+    return candidates[best], float(misfits[best])
 
 
 def _consensus_board_pose(
