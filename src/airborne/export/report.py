@@ -166,7 +166,7 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield _with_unit(head["somersault_rev"], "{:.2f} turns"), "somersault, first to last pose"
         yield _with_unit(head["twist_rev"], "{:.2f} turns"), "twist, first to last pose"
         low, high = head["tilt_range_deg"]
-        yield UNKNOWN_TEXT if low is None else f"{low:.0f}° to {high:.0f}°".replace("-", "−"), "tilt"
+        yield UNKNOWN_TEXT if low is None else f"{round(low)}° to {round(high)}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
     yield (
         UNKNOWN_TEXT if ranges[0] is None else " · ".join(f"{r:.2f}" for r in ranges) + " m",
