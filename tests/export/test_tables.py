@@ -7,7 +7,7 @@ import pytest
 from pyarrow import csv
 
 from airborne.export.tables import body_columns, players_columns, write_csv, write_parquet
-from airborne.motion import joint_angles, landmarks, measure_flight
+from airborne.motion import joint_angles, joint_statuses, landmarks, measure_flight
 from tests.support.export_scenes import BOX, PERSON
 from tests.support.takes import jumping, tumbling
 
@@ -38,13 +38,15 @@ def test_a_row_holds_positions_angles_and_the_centre_of_mass_with_their_deviatio
     np.testing.assert_array_equal(columns["thigh_right_y_deg_sd"].values, angles["angle_sd"])
     np.testing.assert_array_equal(columns["com_z_m"].values, measure_flight(motion, PERSON)["com"].to_numpy()[:, 2])
     assert list(columns)[:5] == ["frame", "time_s", "status", "somersault_deg", "somersault_deg_sd"]
-    assert all(name.endswith(("_m", "_deg", "_m_sd", "_deg_sd")) for name in list(columns)[3:])
+    assert all(name.endswith(("_m", "_deg", "_m_sd", "_deg_sd", "_status")) for name in list(columns)[3:])
+    status = joint_statuses(motion, PERSON, sd)
+    assert columns["knee_left_status"].values.tolist() == status[:, names.index("knee_left")].tolist()
 
 
 def test_a_body_in_one_piece_has_no_joints_and_no_mass():
     motion = tumbling(3, model=BOX)
     columns = body_columns(motion, BOX, *landmarks(motion, BOX), com=None)
-    assert list(columns)[9:] == ["root_x_m", "root_y_m", "root_z_m", "root_m_sd"]
+    assert list(columns)[9:] == ["root_x_m", "root_y_m", "root_z_m", "root_m_sd", "root_status"]
 
 
 def test_players_have_a_row_each_at_every_frame():
@@ -54,6 +56,7 @@ def test_players_have_a_row_each_at_every_frame():
     assert columns["frame"].values.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
     np.testing.assert_array_equal(columns["knee_left_y_m"].values, motion.points[:, :, 2, 1].ravel())
     assert columns["status"].values.tolist()[3] == "lost"
+    np.testing.assert_array_equal(columns["knee_left_status"].values, motion.joint_status[:, :, 2].ravel())
 
 
 def test_csv_and_parquet_read_back_to_the_last_bit(columns, tmp_path):
@@ -75,7 +78,7 @@ def test_the_unknown_is_empty_and_the_unobservable_infinite(columns, tmp_path):
     write_csv(tmp_path / "run.csv", columns)
     write_parquet(tmp_path / "run.parquet", columns)
     lines = [line.split(",") for line in (tmp_path / "run.csv").read_text().splitlines()]
-    assert set(lines[3][3:]) == {""}
+    assert set(lines[3][3:]) == {"", "lost"}
     assert lines[4][list(columns).index("head_m_sd")] == "inf"
     table = pq.read_table(tmp_path / "run.parquet")
     assert table["head_x_m"].null_count == 1

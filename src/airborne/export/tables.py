@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.io import parquet
-from airborne.motion import Motion, PlayersMotion, joint_angles, root_angles
+from airborne.motion import Motion, PlayersMotion, joint_angles, joint_statuses, root_angles
 from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.tables import cell
 
@@ -34,15 +34,17 @@ def body_columns(
 ) -> Columns:
     """Return the columns of one body: the root's angles, its landmarks, its joints' angles, its centre of mass.
 
-    points (n, landmarks, 3) and sd (n, landmarks) [m] as `landmarks` gives them; com, both (n, 3) [m], position
-    and standard deviations, None where masses are unknown. Raises ResultError for another body's motion.
+    Each landmark has a status of its own, of `joint_statuses`. points (n, landmarks, 3) and sd (n, landmarks) [m] as
+    `landmarks` gives them; com, both (n, 3) [m], position and standard deviations, None where masses are unknown.
+    Raises ResultError for another body's motion.
     """
     columns = {"frame": Column(motion.index), "time_s": Column(motion.time_s, "s"), "status": Column(motion.status)}
     root = root_angles(motion)
     for k, name in enumerate(ROOT_ANGLES):
         columns[f"{name}_deg"] = Column(root.deg[:, k], "deg")
         columns[f"{name}_deg_sd"] = Column(root.sd_deg[:, k], "deg")
-    columns |= _point_columns([landmark.name for landmark in model.landmarks], points, sd)
+    names, of_joints = [landmark.name for landmark in model.landmarks], joint_statuses(motion, model, sd)
+    columns |= _point_columns(names, points, sd, of_joints)
     if motion.joints:
         angles_of = joint_angles(motion, model)
         for j, joint in enumerate(motion.joints):
@@ -66,7 +68,7 @@ def players_columns(motion: PlayersMotion) -> Columns:
         "status": Column(motion.status.ravel()),
     }
     points, sd = motion.points.reshape(n * k, -1, 3), motion.sd.reshape(n * k, -1)
-    return columns | _point_columns(motion.joints, points, sd)
+    return columns | _point_columns(motion.joints, points, sd, motion.joint_status.reshape(n * k, -1))
 
 
 def write_csv(path: Path, columns: Columns) -> None:
@@ -83,9 +85,9 @@ def write_parquet(path: Path, columns: Columns) -> None:
     parquet.write_parquet(path, values, units, _CONVENTIONS)
 
 
-def _point_columns(names: list[str] | tuple[str, ...], points: NDArray, sd: NDArray) -> dict[str, Column]:
+def _point_columns(names: Sequence[str], points: NDArray, sd: NDArray, status: NDArray) -> dict[str, Column]:
     columns = {}
     for j, name in enumerate(names):
         columns |= {f"{name}_{axis}_m": Column(points[:, j, k], "m") for k, axis in enumerate("xyz")}
-        columns[f"{name}_m_sd"] = Column(sd[:, j], "m")
+        columns |= {f"{name}_m_sd": Column(sd[:, j], "m"), f"{name}_status": Column(status[:, j])}
     return columns
