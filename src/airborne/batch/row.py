@@ -47,6 +47,8 @@ def row_of(folder: Path) -> TableRow:
 def _columns(folder: Path, summary: Mapping[str, Any]) -> TableRow:
     n = summary["n_frames"]
     row: dict[str, Any] = {"n_frames": n} | {f"share_{name}": summary[f"n_{name}"] / n for name in _STATUSES}
+    if of_joints := summary.get("joint_statuses"):
+        row["share_joints_tracked"] = float(np.mean([counts["tracked"] for counts in of_joints.values()])) / n
     row |= {name: summary[name] for name in ("duration_s", "rate_hz", *_OF_A_BODY) if name in summary}
     if "tilt_range_deg" in summary:
         row |= dict(zip(("tilt_least_deg", "tilt_most_deg"), summary["tilt_range_deg"], strict=True))
