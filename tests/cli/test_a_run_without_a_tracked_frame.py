@@ -13,9 +13,3 @@ def test_it_is_said_before_any_number(tmp_path):
     assert lines[0] == "5 frames at 4 Hz: 0 tracked, 3 uncertain, 2 lost"
     assert lines[1] == "no frame is tracked, so that no number here can be relied on: see the notes"
     assert not any("relied on" in line for line in _describe({**SUMMARY, "n_tracked": 1}, tmp_path).splitlines())
-
-
-def test_a_body_with_joints_has_a_line_of_theirs(tmp_path):
-    statuses = {"foot": {"tracked": 1, "uncertain": 2, "unknown": 2, "lost": 0}}
-    lines = _describe({**SUMMARY, "n_tracked": 1, "joint_statuses": statuses}, tmp_path).splitlines()
-    assert lines[2].startswith("5 joint positions: 1 tracked, 2 uncertain")

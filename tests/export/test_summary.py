@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.export import body_warnings, headline, write_json
-from airborne.export.summary import joints_line, json_ready
+from airborne.export.summary import joint_warnings, json_ready
 from airborne.motion import Motion
 from tests.support.export_scenes import run
 from tests.support.tolerances import ROUNDTRIP
@@ -56,13 +56,11 @@ def test_a_run_without_faults_warns_of_nothing():
 def test_joints_that_cannot_be_trusted_are_warned_of_with_the_worst():
     good = {"tracked": 9, "uncertain": 1, "unknown": 0, "lost": 0}
     bad = {"tracked": 2, "uncertain": 3, "unknown": 5, "lost": 0}
-    head = json_ready(headline(run(10)))
-    (warning,) = body_warnings({**head, "joint_statuses": {"hip": good, "foot": bad}})
+    (warning,) = joint_warnings({"hip": good, "foot": bad})
     counts = "20 joint positions: 11 tracked, 4 uncertain, 5 unknown, 0 lost; fewest of foot, tracked in 2 of 10 frames"
-    assert warning.startswith(f"{counts}. ")
-    best = {"tracked": 10, "uncertain": 0, "unknown": 0, "lost": 0}
-    assert list(body_warnings({**head, "joint_statuses": {"hip": best}})) == []
-    assert joints_line({"hip": best}) == "10 joint positions: 10 tracked, 0 uncertain, 0 unknown, 0 lost"
+    assert warning.startswith(counts)
+    assert list(joint_warnings({"hip": {"tracked": 10, "uncertain": 0, "unknown": 0, "lost": 0}})) == []
+    assert list(joint_warnings({})) == []
 
 
 @pytest.mark.parametrize(

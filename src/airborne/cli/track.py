@@ -194,10 +194,6 @@ def _describe(summary: dict, output: Path) -> str:
                 f"median sd: position {_describe_sd(position, 'mm')}, rotation {_describe_sd(rotation, 'degrees')}; "
                 "summary.json says which errors these include"
             )
-        if "joint_statuses" in summary:
-            from airborne.export.summary import joints_line
-
-            lines.append(joints_line(summary["joint_statuses"]))
     if (line := _describe_self_check(summary)) is not None:
         lines.append(line)
     lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]

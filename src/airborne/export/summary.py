@@ -68,8 +68,6 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
         yield f"{count_of(head['n_lost'], n, 'frame')} lost; they hold no numbers."
     if head["n_uncertain"]:
         yield f"{count_of(head['n_uncertain'], n, 'frame')} uncertain; look at them in the overlay videos before use."
-    if not _are_all_tracked(head.get("joint_statuses", {})):
-        yield f"{joints_line(head['joint_statuses'])}. Trust each by its own status, in the figure below."
     for what in ("position", "rotation"):
         if head[f"n_{what}_unobservable"]:
             yield (
@@ -90,18 +88,18 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def joints_line(statuses: Mapping[str, Mapping[str, int]]) -> str:
-    """Say how far the joints of a run can be trusted, all of them and the worst, by the counts of `count_statuses`."""
+def joint_warnings(statuses: Mapping[str, Mapping[str, int]]) -> Iterator[str]:
+    """Yield how far the joints of a run can be trusted, by the counts of `count_statuses`; nothing if all are."""
     sums = {status: sum(of_joint[status] for of_joint in statuses.values()) for status in JointStatus}
-    worst = min(statuses, key=lambda joint: statuses[joint][JointStatus.TRACKED])
-    n_tracked, n_frames = statuses[worst][JointStatus.TRACKED], sum(statuses[worst].values())
-    counts = ", ".join(f"{n} {status}" for status, n in sums.items())
-    line = f"{count(sum(sums.values()), 'joint position')}: {counts}"
-    return line if n_tracked == n_frames else f"{line}; fewest of {worst}, tracked in {n_tracked} of {n_frames} frames"
-
-
-def _are_all_tracked(statuses: Mapping[str, Mapping[str, int]]) -> bool:
-    return all(of_joint[JointStatus.TRACKED] == sum(of_joint.values()) for of_joint in statuses.values())
+    total = sum(sums.values())
+    if sums[JointStatus.TRACKED] < total:
+        worst = min(statuses, key=lambda joint: statuses[joint][JointStatus.TRACKED])
+        n_tracked, n_frames = statuses[worst][JointStatus.TRACKED], sum(statuses[worst].values())
+        counts = ", ".join(f"{n} {status}" for status, n in sums.items())
+        yield (
+            f"{count(total, 'joint position')}: {counts}; fewest of {worst}, tracked in {n_tracked} of {n_frames} "
+            "frames; joints.csv has the status of each"
+        )
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:
