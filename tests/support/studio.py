@@ -99,6 +99,15 @@ def wait_for_frame(page, frame: int) -> None:
     page.wait_for_function("frame => document.querySelector('canvas.view')?.dataset.frame == frame", arg=str(frame))
 
 
+def wait_until(page, is_so: Callable[[], bool]) -> None:
+    """Wait until something holds that the page does not show; fail after ten seconds."""
+    for _ in range(200):
+        if is_so():
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError("it did not come to hold within ten seconds")
+
+
 def wait_for_still_scene(page) -> int:
     """Wait until the 3D scene is no longer drawn; return how often it was."""
     script = """async () => {

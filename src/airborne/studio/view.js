@@ -6,6 +6,7 @@ import frames from "/parts/view_frames.js";
 const GRAB_PX = 9; // on the screen: how near a mark must be to be grabbed
 const STILL_PX = 3; // a pointer that moves less has clicked
 const GAP = 4; // between pictures
+const SAME_PX = 0.02; // of a video: places are written to a hundredth
 const TAKES_KEYS = "canvas.view, input, select, textarea, [role=dialog], [role=listbox], [role=menu], [role=radiogroup], [role=tablist]";
 const PRESSED = "button, a, [role=switch], [role=checkbox]"; // by Space
 
@@ -38,6 +39,7 @@ export default {
     this.coarse = null; // pictures near the frame that is on its way
     this.drag = null;
     this.dragged = null; // a mark on its way
+    this.unanswered = 0; // steps of it by arrows that the server has not answered
     this.live = null; // {marks, items} in the place of the page's own while the body is dragged
     this.pulling = null; // the movement that the server answers now
     this.pull = null; // the newest one after it
@@ -57,7 +59,14 @@ export default {
     window.removeEventListener("keydown", this.onPageKey);
   },
   watch: {
-    marks() { this.dragged = null; this.live = null; this.draw(); },
+    marks() {
+      const on = this.dragged, mark = on && (this.marks || []).find((each) => each.id === on.id);
+      const isThere = !mark || Math.hypot(mark.u - on.u, mark.v - on.v) < SAME_PX;
+      this.unanswered = isThere ? 0 : Math.max(this.unanswered - 1, 0);
+      if (!this.unanswered) this.dragged = null; // else this answers an earlier step
+      this.live = null;
+      this.draw();
+    },
     items() { this.live = null; this.draw(); },
     selected() { this.draw(); },
     picking() { this.draw(); },
@@ -182,6 +191,7 @@ export default {
         if (drag.moved && drag.holds) this.ask(event, false);
         if (drag.moved && drag.mark) {
           const { id, u, v } = drag.mark;
+          this.unanswered = 0;
           this.dragged = { id, u: u + dx / place.scale, v: v + dy / place.scale };
         } else if (drag.moved && !drag.holds) {
           Object.assign(this.zooms[drag.pane], { u: drag.u - dx / place.scale, v: drag.v - dy / place.scale });
@@ -222,6 +232,7 @@ export default {
         const step = event.shiftKey ? 1 : 0.1, [du, dv] = arrows[event.key];
         const from = this.dragged && this.dragged.id === mark.id ? this.dragged : mark;
         this.dragged = { id: mark.id, u: from.u + du * step, v: from.v + dv * step };
+        this.unanswered += 1;
         this.draw();
         this.$emit("move", { ...this.dragged, frame: this.seen() });
       } else if (event.key === "ArrowLeft" || event.key === "ArrowRight")

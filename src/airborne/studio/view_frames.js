@@ -74,6 +74,7 @@ export default {
     frame = Math.max(0, Math.min(this.n_frames - 1, Math.round(frame)));
     const direction = Math.sign(frame - this.wanted) || 1;
     const begun = performance.now(), hurries = this.wanted !== this.seen(); // it overtakes another: a slider is drawn
+    if (frame !== this.wanted) this.unanswered = 0; // steps of a mark were those of the frame before
     this.wanted = frame;
     for (const [other, stop] of this.underway) // what was fetched ahead of another place only stands in the way
       if (Math.abs(other - frame) > AHEAD) { this.cache.delete(other); stop.abort(); }
