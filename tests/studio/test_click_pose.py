@@ -16,7 +16,7 @@ from airborne.studio.starts import standing_pose
 from airborne.trial.file import read_trial
 from tests.support.browser import open_page
 from tests.support.clips import write_clip
-from tests.support.studio import at_pixel, fork_studio, wait_for_frame, wait_for_still_scene
+from tests.support.studio import at_pixel, fork_studio, wait_for_frame, wait_for_still_scene, wait_until
 
 SIZE = (640, 480)
 FRAME, N_FRAMES = 3, 6
@@ -192,10 +192,7 @@ def test_a_pose_set_by_hand_waits_in_its_frame_for_whoever_turns_away_reloads_or
         np.testing.assert_allclose(middle(page), dragged, atol=1)
         page.locator("canvas.view").press("Control+z")
         page.get_by_text("undone: pose set by hand (draft.json)").wait_for()
-        for _ in range(100):
-            if abs(middle(page)[0] - placed[0]) <= 1:
-                break
-            page.wait_for_timeout(100)
+        wait_until(page, lambda: abs(middle(page)[0] - placed[0]) <= 1)
         np.testing.assert_allclose(middle(page), placed, atol=1)
         page.get_by_role("button", name="Fit it to the pictures").click()
         page.get_by_text("fitting the body …").wait_for()

@@ -8,7 +8,7 @@ from tests.support.browser import open_page
 from tests.support.example_trial import edit_trial
 from tests.support.places import THROWN_CROSS
 from tests.support.players_trial import write_run, write_trial
-from tests.support.studio import fork_studio, wait_for_frame
+from tests.support.studio import fork_studio, wait_for_frame, wait_until
 
 N, LAST = 6, 3
 
@@ -28,9 +28,8 @@ def test_method_and_last_frame_are_written_into_the_trial_and_undone(tmp_path):
         page.get_by_text(f"the last frame of all videos is {N - 1}; {N} lies after it").wait_for()
         last.fill(str(LAST))
         last.press("Enter")
-        while len(track := read_toml(trial)["track"]) < 2:  # a field that is typed in is not set anew meanwhile
-            page.wait_for_timeout(100)
-        assert track == {"method": PLAYERS_METHODS[1], "stop": LAST + 1}
+        wait_until(page, lambda: len(read_toml(trial)["track"]) == 2)  # what is typed in is not set anew meanwhile
+        assert read_toml(trial)["track"] == {"method": PLAYERS_METHODS[1], "stop": LAST + 1}
         page.locator("canvas.view").press("Control+z")
         page.wait_for_function("n => document.querySelector('[aria-label=\"last frame\"]').value == n", arg=str(N - 1))
         page.locator("canvas.view").press("Control+z")
