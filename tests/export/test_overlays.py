@@ -49,6 +49,17 @@ def test_the_outline_has_the_colour_of_the_status_and_hides_none_of_the_body(tmp
     assert far_from(inside, [SCENE_GREY] * 3).max() < CODED
 
 
+def test_a_segment_that_is_in_doubt_has_the_colour_of_an_uncertain_frame(tmp_path):
+    rig = Rig((camera(size=(960, 720)),))
+    shots = [(frames(k, rig=rig), posed(), Status.TRACKED, np.array([k == 1])) for k in range(2)]
+    ((sure, doubtful),) = write_videos(tmp_path, shots, rig)
+    mask = render(surface_arrays(BOX), posed(), rig.cameras[0], FLAT).mask
+    rows, columns = np.nonzero(mask)
+    at = round(rows.mean()), columns.min() - 2
+    for picture, status in ((sure, Status.TRACKED), (doubtful, Status.UNCERTAIN)):
+        assert far_from(picture[at], STATUS_RGB[status]) == min(far_from(picture[at], rgb) for rgb in STATUS_RGB.values())
+
+
 def test_a_lost_frame_has_a_border_and_no_outline(tmp_path):
     ((lost, result), _) = write_videos(tmp_path, [(frames(0), None, Status.LOST), (frames(1), posed(), Status.TRACKED)])
     assert far_from(lost[1, 100:-100], STATUS_RGB[Status.LOST]).mean() < CODED

@@ -18,7 +18,11 @@ from tests.support.motions import estimate, run_with_gap
 from tests.support.places import ROOT
 from tests.support.tolerances import ROUNDTRIP
 
-COLUMNS = "frame,time_s,status,score,x_m,y_m,z_m,qx,qy,qz,qw,x_m_sd,y_m_sd,z_m_sd,rx_deg_sd,ry_deg_sd,rz_deg_sd,n_views"
+COLUMNS = (
+    "frame,time_s,status,score,x_m,y_m,z_m,qx,qy,qz,qw,x_m_sd,y_m_sd,z_m_sd,rx_deg_sd,ry_deg_sd,rz_deg_sd,n_views,"
+    "uncertain_joints"
+)
+MARKED = ((0, 2), (), (1,))  # of three joints, in three frames
 
 
 def write(path, estimates, joints=()):
@@ -32,6 +36,7 @@ def assert_same(result, expected):
     assert len(result) == len(expected)
     for a, b in zip(result, expected, strict=True):
         assert (a.index, a.time_s, a.status, a.n_views) == (b.index, b.time_s, b.status, b.n_views)
+        assert a.uncertain_joints == b.uncertain_joints
         np.testing.assert_array_equal(a.score, b.score)
         assert (a.pose is None, a.covariance is None) == (b.pose is None, b.covariance is None)
         if a.pose is not None:
@@ -51,6 +56,17 @@ def test_joint_angles_and_their_names_come_back_bit_for_bit(tmp_path):
     path = write(tmp_path / "motion.csv", estimates, ("chest", "head"))
     assert_same(read_estimates(path), estimates)
     assert read_motion(path).joints == ("chest", "head")
+
+
+def test_uncertain_joints_come_back_and_another_bodys_are_refused(tmp_path):
+    joints = ("upper arm left", "forearm", "hand")
+    marked = [replace(each, uncertain_joints=of) for each, of in zip(run_with_gap(3, n_joints=3), MARKED, strict=True)]
+    path = write(tmp_path / "motion.csv", marked, joints)
+    assert_same(read_estimates(path), marked)
+    assert read_motion(path).uncertain_joints.tolist() == [[True, False, True], [False] * 3, [False, True, False]]
+    path.write_text(path.read_text().replace("/hand", "/tail"))
+    with pytest.raises(ResultError, match=r"line 2: uncertain_joints names 'tail', expected some of upper arm left, fo"):
+        read_motion(path)
 
 
 def test_one_frame_is_a_motion(tmp_path):
@@ -75,7 +91,7 @@ def test_infinite_and_unknown_variances_come_back(tmp_path):
 def test_columns_begin_as_documented_and_lost_frames_have_empty_cells(tmp_path):
     lines = write(tmp_path / "motion.csv", run_with_gap(2, lost=[1])).read_text().splitlines()
     assert lines[0].startswith(COLUMNS + ",cov_00,")
-    assert lines[2].startswith("1,0.016683333333333335,lost,,,,,,,,,,,,,,,0,")
+    assert lines[2].startswith("1,0.016683333333333335,lost,,,,,,,,,,,,,,,0,,")
 
 
 def test_deviations_are_the_roots_of_the_variances_with_rotation_in_degrees(tmp_path):

@@ -73,6 +73,15 @@ def test_points_with_a_large_deviation_are_uncertain():
     assert statuses(doubtful, "knee_right") == [JointStatus.TRACKED] * 5
 
 
+def test_joint_that_may_lie_elsewhere_is_uncertain_however_small_its_deviation():
+    run = motion(n=2)
+    run.uncertain_joints[1, JOINTS.index("hand_left")] = True
+    status = joint_statuses(run, HUMAN, landmarks(run, HUMAN)[1])
+    is_uncertain = status == JointStatus.UNCERTAIN.value
+    assert [name for name, each in zip(NAMES, is_uncertain[1], strict=True) if each] == ["wrist_left", "hand_left"]
+    assert not is_uncertain[0].any() and set(status.ravel()) == {JointStatus.TRACKED, JointStatus.UNCERTAIN}
+
+
 def test_joint_beyond_its_limits_is_uncertain_if_it_stays_there():
     bent = {1: -20.0, 2: -20.0, 3: -20.0}
     status = statuses(motion(knee_deg=bent), "ankle_left")

@@ -77,6 +77,21 @@ def test_a_limb_in_two_places_is_in_the_likelier_one_and_as_uncertain_as_they_ar
     assert np.sqrt(np.trace(joined.covariance[6 + 3 * arm :, 6 + 3 * arm :][:3, :3])) > 0.9 * angle
 
 
+def test_segments_that_are_far_apart_are_uncertain_by_name():
+    angles = TRUTH.joint_angles.copy()
+    angles[HUMAN.index_of("forearm_left") - 1, 0] += 0.5
+    joined = join([estimate(TRUTH)], [estimate(replace(TRUTH, joint_angles=angles))], [5.0])[0]
+    assert [HUMAN.segments[1 + joint].name for joint in joined.uncertain_joints] == ["hand_left"]  # the elbow stays
+    assert joined.status is Status.TRACKED
+    assert join([estimate(TRUTH)], [estimate(TRUTH)])[0].uncertain_joints == ()
+
+
+@pytest.mark.parametrize(("moved_m", "status"), [(0.04, Status.TRACKED), (0.06, Status.UNCERTAIN)])
+def test_a_frame_is_uncertain_where_its_trunk_is_in_two_places(moved_m, status):
+    elsewhere = TRUTH.move(np.array([moved_m, 0, 0]), np.zeros(3))
+    assert join([estimate(TRUTH, 0.001)], [estimate(elsewhere, 0.001)], [1.0])[0].status is status
+
+
 def test_the_forward_pass_is_right_up_to_one_frame_and_the_backward_pass_from_there():
     """Single frames may say otherwise: the whole stretch decides where."""
     gains = [-30, -20, 5, -10, 20, -5, 30]

@@ -112,11 +112,11 @@ class OverlayVideos:
         self._videos = CameraVideos(folder, rig, rate, drawn)
 
     def write(
-        self, frames: Frames, posed: PosedBody | None, status: Status, unknown: NDArray[np.bool_] | None = None
+        self, frames: Frames, posed: PosedBody | None, status: Status, doubtful: NDArray[np.bool_] | None = None
     ) -> None:
         """Append what every camera saw at one time; no outline is drawn where `posed` is None.
 
-        unknown (segments,): those that the images do not show are drawn in the colour of an uncertain frame.
+        doubtful (segments,): these are drawn in the colour of an uncertain frame.
         """
         images = []
         for view, camera in zip(frames.views, self._videos.cameras, strict=True):
@@ -124,9 +124,9 @@ class OverlayVideos:
             if view is not None and posed is not None:
                 drawn = render(cached_surface_arrays(posed.model), posed, camera, FLAT)
                 _draw_outline(image, drawn.mask, STATUS_RGB[status])
-                if unknown is not None and unknown.any():
-                    hidden = drawn.mask & unknown[np.maximum(drawn.segment, 0)]
-                    _draw_outline(image, hidden, STATUS_RGB[Status.UNCERTAIN])
+                if doubtful is not None and doubtful.any():
+                    shown = drawn.mask & doubtful[np.maximum(drawn.segment, 0)]
+                    _draw_outline(image, shown, STATUS_RGB[Status.UNCERTAIN])
             if status is Status.LOST:
                 _draw_border(image, STATUS_RGB[status])
             draw_label(image, time_label(frames, status), STATUS_RGB[status])

@@ -202,7 +202,7 @@ def _parse(path: Path) -> tuple[tuple[str, ...], list[Estimate]]:
     for number, cells in enumerate(rows[1:], start=2):
         try:
             covariance = covariances[number - 2] if joints else None
-            estimate = _estimate(dict(zip(header, cells, strict=True)), len(joints), covariance)
+            estimate = _estimate(dict(zip(header, cells, strict=True)), joints, covariance)
             if estimate.index in seen:
                 raise ValueError(f"frame {estimate.index} a second time, expected each once")
             seen.add(estimate.index)
@@ -228,12 +228,12 @@ def parse_line(path: Path, line: bytes, joints: tuple[str, ...]) -> Estimate:
     """Return the estimate of one line of a motion.csv, without the covariances of joints. Raises ResultError."""
     cells = line.decode(errors="replace").rstrip("\r\n").split(",")
     try:
-        return _estimate(dict(zip(_header(joints), cells, strict=True)), len(joints), None)
+        return _estimate(dict(zip(_header(joints), cells, strict=True)), joints, None)
     except (ValueError, ZeroDivisionError) as error:
         raise ResultError(f"{path}: the row of frame {cells[0][:20]}: {error}; track again") from None
 
 
-def _estimate(row: dict[str, str], n_joints: int, full: NDArray[np.float64] | None) -> Estimate:
+def _estimate(row: dict[str, str], joints: tuple[str, ...], full: NDArray[np.float64] | None) -> Estimate:
     """Make an estimate from a row of motion.csv and, for a body with joints, its row of covariance.bin."""
     status = Status(row["status"])
     position = _numbers(row, ["x_m", "y_m", "z_m"])
@@ -252,7 +252,7 @@ def _estimate(row: dict[str, str], n_joints: int, full: NDArray[np.float64] | No
             raise ValueError(f"r00..r22 of a {status} frame are not a rotation")
         if not np.isfinite(position).all():
             raise ValueError(f"a {status} frame has no position")
-        angles = _numbers(row, list(row)[-3 * n_joints :] if n_joints else []).reshape(n_joints, 3)
+        angles = _numbers(row, list(row)[-3 * len(joints) :] if joints else []).reshape(-1, 3)
         pose = Pose(world_from_root=rigid_transform(R, position), joint_angles=angles)
     return Estimate(
         index=_whole_number(row["frame"]),
@@ -262,7 +262,16 @@ def _estimate(row: dict[str, str], n_joints: int, full: NDArray[np.float64] | No
         pose=pose,
         covariance=None if np.isnan(covariance).all() else covariance,
         n_views=_whole_number(row["n_views"]),
+        uncertain_joints=_places(row["uncertain_joints"], joints),
     )
+
+
+def _places(text: str, joints: tuple[str, ...]) -> tuple[int, ...]:
+    names = text.split("/") if text else []
+    unknown = next((name for name in names if name not in joints), None)
+    if unknown is not None:
+        raise ValueError(f"uncertain_joints names '{unknown[:40]}', expected some of {', '.join(joints) or 'none'}")
+    return tuple(map(joints.index, names))
 
 
 def _whole_number(text: str) -> int:

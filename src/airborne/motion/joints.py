@@ -89,11 +89,14 @@ def _place_variance(model: BodyModel, owners: NDArray[np.int64]) -> Array:
 def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.str_]:
     """Return how far each landmark can be trusted in each frame: (n, landmarks), values of `JointStatus`.
 
-    sd (n, landmarks) [m] as `landmarks` gives it. A joint that lies beyond its limits for several frames on end makes
-    the landmarks that hang on it uncertain, and crossed legs that fewer than three cameras show make theirs.
+    sd (n, landmarks) [m] as `landmarks` gives it. A joint that may be elsewhere makes the landmarks of its segment
+    uncertain, one beyond its limits for several frames on end those that hang on it, and crossed legs that fewer than
+    three cameras show make theirs.
     """
     status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
+    owners = [model.index_of(landmark.segment) for landmark in model.landmarks]
     is_doubtful = (sd > UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)] | _may_swap(motion, model)
+    is_doubtful |= np.pad(motion.uncertain_joints, ((0, 0), (1, 0)))[:, owners]
     status[(status == JointStatus.TRACKED.value) & is_doubtful] = JointStatus.UNCERTAIN.value
     status[motion.has_pose[:, None] & np.isinf(sd)] = JointStatus.UNKNOWN.value
     return status

@@ -34,6 +34,7 @@ class Motion:
     covariance: Array  # (n, 6 + 3 joints, 6 + 3 joints)
     joints: tuple[str, ...]  # names of the segments after the root; () for a body in one piece
     joint_angles: Array  # (n, joints, 3) x-y-z [rad]
+    uncertain_joints: NDArray[np.bool_]  # (n, joints) that may be elsewhere, whatever the covariance says
     lasting: Array | None = None  # (n, 6, 6) of the root's errors that last all run long, beside `covariance`
 
     @classmethod
@@ -44,7 +45,7 @@ class Motion:
         """
         n, size = len(estimates), 6 + 3 * len(joints)
         position, R, covariance = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, size, size), np.nan)
-        joint_angles = np.full((n, len(joints), 3), np.nan)
+        joint_angles, uncertain = np.full((n, len(joints), 3), np.nan), np.zeros((n, len(joints)), np.bool_)
         for row, estimate in enumerate(estimates):
             if estimate.pose is not None:
                 world_from_root = estimate.pose.world_from_root.as_matrix()
@@ -53,6 +54,7 @@ class Motion:
             if estimate.covariance is not None:
                 m = len(estimate.covariance)
                 covariance[row, :m, :m] = estimate.covariance
+            uncertain[row, list(estimate.uncertain_joints)] = True
         return cls(
             index=np.array([e.index for e in estimates], np.int64),
             time_s=np.array([float(e.time_s) for e in estimates], float),
@@ -64,6 +66,7 @@ class Motion:
             covariance=covariance,
             joints=joints,
             joint_angles=joint_angles,
+            uncertain_joints=uncertain,
         )
 
     def __len__(self) -> int:

@@ -33,7 +33,7 @@ from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.run.whole_run import FittedRun, fit_whole_run
 from airborne.tracking import Estimate
-from airborne.tracking.estimate import Status, unknown_segments
+from airborne.tracking.estimate import Status, doubtful_segments
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.self_check.kept_frames import KeptFrames
@@ -192,7 +192,7 @@ class BodyRun:
         posed = None if pose is None else self.model.with_pose(pose)
         for artist in artists:
             if isinstance(artist, OverlayVideos):
-                artist.write(frames, posed, estimate.status, unknown_segments(estimate, self.model))
+                artist.write(frames, posed, estimate.status, doubtful_segments(estimate, self.model))
             else:
                 artist.write(frames, posed, estimate.status)
 

@@ -45,6 +45,7 @@ class Estimate:
     covariance: Array | None
     n_views: int  # cameras with an image that shows the body
     mask_shares: tuple[float, float] | None = None  # precision and recall of its mask, by what was learned before
+    uncertain_joints: tuple[int, ...] = ()  # those, 0 for the first, that may be elsewhere, whatever the covariance says
 
 
 def lost_estimate(index: int, time_s: Fraction) -> Estimate:
@@ -52,12 +53,13 @@ def lost_estimate(index: int, time_s: Fraction) -> Estimate:
     return Estimate(index=index, time_s=time_s, status=Status.LOST, score=np.nan, pose=None, covariance=None, n_views=0)
 
 
-def unknown_segments(estimate: Estimate, model: BodyModel) -> NDArray[np.bool_]:
-    """Return which segments the images do not show: an unobserved joint, or one nearer to the trunk: (segments,)."""
-    unknown = np.zeros(len(model.segments), bool)
-    if estimate.covariance is None or len(estimate.covariance) != model.n_dofs:
-        return unknown
-    unknown[1:] = np.isinf(np.diagonal(estimate.covariance)[6:]).reshape(-1, 3).any(axis=1)
-    for segment, parent in enumerate(model.parents[1:], start=1):
-        unknown[segment] |= unknown[parent]
-    return unknown
+def doubtful_segments(estimate: Estimate, model: BodyModel) -> NDArray[np.bool_]:
+    """Return which segments (segments,) hang on a joint that the images do not show, or have an end that is uncertain."""
+    doubtful = np.zeros(len(model.segments), np.bool_)
+    if estimate.covariance is not None and len(estimate.covariance) == model.n_dofs:
+        doubtful[1:] = np.isinf(np.diagonal(estimate.covariance)[6:]).reshape(-1, 3).any(axis=1)
+        for segment, parent in enumerate(model.parents[1:], start=1):
+            doubtful[segment] |= doubtful[parent]
+    for joint in estimate.uncertain_joints:
+        doubtful[[1 + joint, model.parents[1 + joint]]] = True
+    return doubtful

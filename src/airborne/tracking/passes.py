@@ -3,8 +3,8 @@
 Both see the same images, so that where they agree the joined information is the mean of the two, not the sum. Where
 a limb or the trunk disagrees, one of the passes has lost it: the forward pass is right up to some frame, and from
 there on the backward pass. That frame is where the images are likeliest over the whole stretch of disagreement. A limb
-that is in two places is as uncertain as they are apart, however sure the images seem: both may be wrong. Where the
-trunk disagrees too, and any joint is far apart, the frame is uncertain, and nothing is learned from it.
+that is in two places is as uncertain as they are apart, however sure the images seem: both may be wrong. Segments that
+are far apart are uncertain by name; where the trunk is, the frame is, and nothing is learned from it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class PassDifference:
 
     delta: Array  # (6 + 3 joints,) from the forward to the backward one; empty where either has no pose
     apart: tuple[int, ...]  # the parts, see `parts_of`, that disagree: beyond their covariances, or by _APART_M
-    is_far: bool  # whether a joint is further apart than _APART_M
+    is_far: NDArray[np.bool_]  # which segments have a landmark further apart than _APART_M; empty as `delta`
     candidates: tuple[Pose, ...]  # the forward pose, and it with each of those parts as the backward pass has it
 
 
@@ -59,28 +59,22 @@ def parts_of(model: BodyModel) -> list[NDArray[np.int64]]:
 def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> PassDifference:
     """Compare two estimates part by part; where the trunks disagree, everything is one part."""
     if forward.pose is None or backward.pose is None:
-        return PassDifference(np.zeros(0), (), False, ())
+        return PassDifference(np.zeros(0), (), np.zeros(0, np.bool_), ())
     delta = delta_between(forward.pose, backward.pose)
     covariance = _covariance(forward, len(delta)) + _covariance(backward, len(delta))
     parts, here, there = parts_of(model), model.with_pose(forward.pose), model.with_pose(backward.pose)
-    off_m = np.linalg.norm(here.landmarks - there.landmarks, axis=-1)
-    part_of = _part_of_landmarks(model)
+    off_m, is_far = np.linalg.norm(here.landmarks - there.landmarks, axis=-1), np.zeros(len(model.segments), np.bool_)
+    is_far[[model.index_of(model.landmarks[k].segment) for k in np.flatnonzero(off_m > _APART_M)]] = True
+    part_of = np.unique(limb_of_segment(model), return_inverse=True)[1]
     apart = tuple(
         k
         for k, own in enumerate(parts)
-        if _is_apart(delta[own], covariance[np.ix_(own, own)]) or np.any(off_m[part_of == k] > _APART_M)
+        if _is_apart(delta[own], covariance[np.ix_(own, own)]) or np.any(is_far[part_of == k])
     )
-    is_far = bool(np.any(off_m > _APART_M))
     if 0 in apart:
         return PassDifference(delta, tuple(range(len(parts))), is_far, (forward.pose, backward.pose))
     candidates = (forward.pose, *(_with_limbs(model, forward.pose, backward.pose, [k]) for k in apart)) if apart else ()
     return PassDifference(delta, apart, is_far, candidates)
-
-
-def _part_of_landmarks(model: BodyModel) -> NDArray[np.int64]:
-    """Return the part of each landmark: (landmarks,)."""
-    part = np.unique(limb_of_segment(model), return_inverse=True)[1]
-    return part[[model.index_of(landmark.segment) for landmark in model.landmarks]]
 
 
 def join_passes(model: BodyModel, passes: Sequence[Passes]) -> list[Estimate]:
@@ -135,8 +129,9 @@ def _join(model: BodyModel, passes: Passes, takes_backward: NDArray[np.bool_]) -
         pose = _with_limbs(model, forward.pose, backward.pose, [k for k in difference.apart if takes_backward[k]])
     for k in difference.apart:
         covariance[np.ix_(parts[k], parts[k])] += np.outer(delta[parts[k]], delta[parts[k]])
-    status = Status.UNCERTAIN if difference.is_far and 0 in difference.apart else better.status
-    return replace(better, pose=pose, covariance=with_unobserved(covariance), status=status)
+    status = Status.UNCERTAIN if difference.is_far[limb_of_segment(model) < 0].any() else better.status
+    far = tuple(np.flatnonzero(difference.is_far[1:]).tolist())
+    return replace(better, pose=pose, covariance=with_unobserved(covariance), status=status, uncertain_joints=far)
 
 
 def _with_limbs(model: BodyModel, pose: Pose, other: Pose, parts: Sequence[int]) -> Pose:
