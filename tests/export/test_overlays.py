@@ -57,7 +57,8 @@ def test_a_segment_that_is_in_doubt_has_the_colour_of_an_uncertain_frame(tmp_pat
     rows, columns = np.nonzero(mask)
     at = round(rows.mean()), columns.min() - 2
     for picture, status in ((sure, Status.TRACKED), (doubtful, Status.UNCERTAIN)):
-        assert far_from(picture[at], STATUS_RGB[status]) == min(far_from(picture[at], rgb) for rgb in STATUS_RGB.values())
+        off = {each: far_from(picture[at], rgb) for each, rgb in STATUS_RGB.items()}
+        assert min(off, key=off.__getitem__) is status
 
 
 def test_a_lost_frame_has_a_border_and_no_outline(tmp_path):

@@ -45,7 +45,7 @@ class Estimate:
     covariance: Array | None
     n_views: int  # cameras with an image that shows the body
     mask_shares: tuple[float, float] | None = None  # precision and recall of its mask, by what was learned before
-    uncertain_joints: tuple[int, ...] = ()  # those, 0 for the first, that may be elsewhere, whatever the covariance says
+    uncertain_joints: tuple[int, ...] = ()  # those, from 0, that may be elsewhere, whatever the covariance says
 
 
 def lost_estimate(index: int, time_s: Fraction) -> Estimate:
@@ -54,7 +54,7 @@ def lost_estimate(index: int, time_s: Fraction) -> Estimate:
 
 
 def doubtful_segments(estimate: Estimate, model: BodyModel) -> NDArray[np.bool_]:
-    """Return which segments (segments,) hang on a joint that the images do not show, or have an end that is uncertain."""
+    """Return which segments (segments,) hang on a joint that the images do not show, or have an uncertain end."""
     doubtful = np.zeros(len(model.segments), np.bool_)
     if estimate.covariance is not None and len(estimate.covariance) == model.n_dofs:
         doubtful[1:] = np.isinf(np.diagonal(estimate.covariance)[6:]).reshape(-1, 3).any(axis=1)

@@ -247,12 +247,11 @@ class Fitter:
         somersaults no second place was better. The prior is returned too, wide for a limb that was moved.
         """
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
-        dofs = joints_of(self.model, limb)
-        masks, coarse = learned.masks, len(NEAR) - 1
-        poses = [
-            fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs)
-            for pose in search_limb(self.render_model, [fit.pose, *expected], limb, learned.evidence)
-        ]
+        places = search_limb(self.render_model, [fit.pose, *expected], limb, learned.evidence)
+        if not places:
+            return fit, prior
+        dofs, masks, coarse = joints_of(self.model, limb), learned.masks, len(NEAR) - 1
+        poses = [fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs) for pose in places]
         best = max(poses, key=lambda pose: self.agreement(pose, learned).evidence)
         best = fit_silhouettes(self.render_model, best, masks, levels=NEAR[coarse:], dofs=dofs)
         if limb_distance(self.model, fit.pose, best, limb) < SAME_M:
