@@ -91,6 +91,12 @@ def test_search_for_a_limb_brings_it_near_and_moves_nothing_else(frame, name):
         assert HUMAN.is_within_limits(pose)
 
 
+@pytest.mark.parametrize("name", FOLDS)
+def test_limb_that_has_most_evidence_where_it_is_has_no_other_place(frame, name):
+    evidence = region_evidence(*frame.views(frame.truth))
+    assert search_limb(frame.render_model, [frame.truth], limb_with(name), evidence) == []
+
+
 @pytest.mark.parametrize("name", ["upper_arm_left", "thigh_right", "forearm_right"])
 def test_start_with_one_limb_folded_wrong_is_put_right_in_the_first_frame(name):
     estimates = track(SCENE, range(1), tracker(SCENE, fold(SCENE.start(), name, (FOLDS | FOREARM)[name])))
