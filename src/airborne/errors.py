@@ -106,7 +106,8 @@ def list_mistakes(error: ValidationError, tags: Collection[str], document: Any, 
     Tables of a list are named as the `document` names them, and the keys of `model` are suggested for unknown ones.
     """
     by_place: dict[tuple[str, ...], list[ErrorDetails]] = {}
-    for one in error.errors(include_url=False):
+    found = error.errors(include_url=False)
+    for one in [each for each in found if each["type"] != "union_tag_not_found"] or found:
         by_place.setdefault(_name_steps(one, tags, document), []).append(one)
     places = [
         place for place in by_place if not any(other[: len(place)] == place for other in by_place if other != place)

@@ -1,5 +1,7 @@
 """TRC files read back by OpenSim and by our own reader: places, gaps, times, rates."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,15 @@ def test_our_own_reader_gives_the_world_positions_back(take, tmp_path):
     assert paths.names == take.markers
     np.testing.assert_allclose(paths.points, take.points, atol=TOLERANCE_M)
     np.testing.assert_allclose(paths.time_s, take.time_s, atol=1e-9)
+
+
+def test_points_that_the_images_do_not_show_are_gaps(take, tmp_path):
+    sd = take.sd.copy()
+    sd[1, 4] = np.inf
+    write_trc(tmp_path / "run.trc", replace(take, sd=sd))
+    expected = take.points.copy()
+    expected[1, 4] = np.nan
+    np.testing.assert_allclose(read_joint_paths(tmp_path / "run.trc").points, expected, atol=TOLERANCE_M)
 
 
 def test_opensim_gives_them_back_with_y_up(take, opensim, tmp_path):

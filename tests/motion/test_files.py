@@ -213,6 +213,22 @@ def test_without_covariance_bin_only_what_the_joints_add_is_unknown(tmp_path):
     np.testing.assert_array_equal(result, expected)
 
 
+@pytest.mark.parametrize(
+    ("column", "cell", "said"),
+    [
+        ("status", "trackd", "status is 'trackd', expected tracked, uncertain, lost"),
+        ("n_views", "two", "n_views is 'two', expected a whole number"),
+    ],
+)
+def test_damaged_cell_is_named_with_what_was_expected(tmp_path, column, cell, said):
+    path = write(tmp_path / "motion.csv", run_with_gap(1))
+    header, row = (line.split(",") for line in path.read_text().splitlines())
+    row[header.index(column)] = cell
+    path.write_text("\n".join([",".join(header), ",".join(row), ""]))
+    with pytest.raises(ResultError, match=f"line 2: {said}"):
+        read_motion(path)
+
+
 def test_covariance_of_the_root_alone_leaves_the_joints_unknown(tmp_path):
     item = estimate(0, n_joints=2)
     alone = replace(item, covariance=item.covariance[:6, :6])

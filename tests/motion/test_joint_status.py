@@ -7,7 +7,7 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.body import Pose, human18
 from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
-from airborne.motion.joints import count_statuses
+from airborne.motion.joints import count_statuses, doubtful_segments
 from airborne.tracking import Estimate, Status
 
 HUMAN = human18()
@@ -65,6 +65,18 @@ def test_points_beyond_an_unobserved_joint_are_unknown_and_the_others_tracked():
     unseen = motion(wide={"forearm_left": np.inf})
     assert statuses(unseen, "wrist_left") == statuses(unseen, "hand_left") == [JointStatus.UNKNOWN] * 5
     assert statuses(unseen, "elbow_left") == statuses(unseen, "wrist_right") == [JointStatus.TRACKED] * 5
+
+
+def test_points_of_unknown_deviation_are_uncertain_where_the_frame_is_tracked():
+    assert statuses(motion(n=1, wide={"forearm_left": np.nan}), "wrist_left") == [JointStatus.UNCERTAIN]
+
+
+def test_segments_beside_a_joint_that_is_not_tracked_are_doubtful():
+    run = motion(n=2)
+    run.uncertain_joints[1, JOINTS.index("shank_left")] = True
+    doubtful = doubtful_segments(joint_statuses(run, HUMAN, landmarks(run, HUMAN)[1]), HUMAN)
+    assert not doubtful[0].any()
+    assert {HUMAN.segments[k].name for k in np.flatnonzero(doubtful[1])} == {"thigh_left", "shank_left"}
 
 
 def test_points_with_a_large_deviation_are_uncertain():

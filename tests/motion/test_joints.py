@@ -73,6 +73,14 @@ def test_joint_angles_continue_over_full_revolutions_and_lost_frames():
     assert table["angle"].attrs["units"] == "deg"
 
 
+def test_angles_that_begin_beyond_half_a_turn_are_brought_back_by_whole_turns():
+    """As of arms that are lowered from overhead: 183 to 325 degrees are -177 to -35."""
+    x = np.radians(np.linspace(183, 325, 30))
+    motion = motion_of(MODEL, bent(x, np.zeros(30), np.zeros(30)))
+    result = joint_angles(motion, MODEL)["angle"].sel(joint="head", axis="x").to_numpy()
+    np.testing.assert_allclose(result, np.rad2deg(x) - 360, atol=1e3 * ROUNDTRIP)
+
+
 def test_joint_angles_run_on_through_a_right_angle():
     y = np.linspace(1.2, 2.0, 41)
     straight = np.stack([np.full(41, 0.3), y, np.full(41, -0.2)], axis=-1)

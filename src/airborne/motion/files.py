@@ -235,6 +235,8 @@ def parse_line(path: Path, line: bytes, joints: tuple[str, ...]) -> Estimate:
 
 def _estimate(row: dict[str, str], joints: tuple[str, ...], full: NDArray[np.float64] | None) -> Estimate:
     """Make an estimate from a row of motion.csv and, for a body with joints, its row of covariance.bin."""
+    if row["status"] not in set(Status):
+        raise ValueError(f"status is '{row['status'][:40]}', expected {', '.join(Status)}")
     status = Status(row["status"])
     position = _numbers(row, ["x_m", "y_m", "z_m"])
     R = _numbers(row, _ROTATION).reshape(3, 3)
@@ -255,13 +257,13 @@ def _estimate(row: dict[str, str], joints: tuple[str, ...], full: NDArray[np.flo
         angles = _numbers(row, list(row)[-3 * len(joints) :] if joints else []).reshape(-1, 3)
         pose = Pose(world_from_root=rigid_transform(R, position), joint_angles=angles)
     return Estimate(
-        index=_whole_number(row["frame"]),
+        index=_whole_number(row, "frame"),
         time_s=_exact_fraction(row[_TIME]),
         status=status,
         score=_number(row["score"]),
         pose=pose,
         covariance=None if np.isnan(covariance).all() else covariance,
-        n_views=_whole_number(row["n_views"]),
+        n_views=_whole_number(row, "n_views"),
         uncertain_joints=_places(row["uncertain_joints"], joints),
     )
 
@@ -274,10 +276,10 @@ def _places(text: str, joints: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(map(joints.index, names))
 
 
-def _whole_number(text: str) -> int:
-    if not re.fullmatch(r"-?[0-9]{1,15}", text):
-        raise ValueError(f"'{text[:40]}' is no whole number")
-    return int(text)
+def _whole_number(row: dict[str, str], column: str) -> int:
+    if not re.fullmatch(r"-?[0-9]{1,15}", row[column]):
+        raise ValueError(f"{column} is '{row[column][:40]}', expected a whole number")
+    return int(row[column])
 
 
 def _exact_fraction(text: str) -> Fraction:

@@ -89,17 +89,31 @@ def _place_variance(model: BodyModel, owners: NDArray[np.int64]) -> Array:
 def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.str_]:
     """Return how far each landmark can be trusted in each frame: (n, landmarks), values of `JointStatus`.
 
-    sd (n, landmarks) [m] as `landmarks` gives it. A joint that may be elsewhere makes the landmarks of its segment
+    sd (n, landmarks) [m] as `landmarks` gives it; where that is unknown none is tracked. A joint that may be elsewhere makes the landmarks of its segment
     uncertain, one beyond its limits for several frames on end those that hang on it, and crossed legs that fewer than
     three cameras show make theirs.
     """
     status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
     owners = [model.index_of(landmark.segment) for landmark in model.landmarks]
-    is_doubtful = (sd > UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)] | _may_swap(motion, model)
+    is_doubtful = ~(sd <= UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)] | _may_swap(motion, model)
     is_doubtful |= np.pad(motion.uncertain_joints, ((0, 0), (1, 0)))[:, owners]
     status[(status == JointStatus.TRACKED.value) & is_doubtful] = JointStatus.UNCERTAIN.value
     status[motion.has_pose[:, None] & np.isinf(sd)] = JointStatus.UNKNOWN.value
     return status
+
+
+def doubtful_segments(status: NDArray[np.str_], model: BodyModel) -> NDArray[np.bool_]:
+    """Return which segments have a landmark, or an end, that is not tracked: (n, segments).
+
+    status (n, landmarks) is that of `joint_statuses`.
+    """
+    doubtful = np.zeros((len(status), len(model.segments)), np.bool_)
+    for landmark, is_doubtful in zip(model.landmarks, (status != JointStatus.TRACKED.value).T, strict=True):
+        segment = model.index_of(landmark.segment)
+        doubtful[:, segment] |= is_doubtful
+        if landmark.at_joint and segment > 0:
+            doubtful[:, model.parents[segment]] |= is_doubtful
+    return doubtful
 
 
 def count_statuses(status: NDArray[np.str_], model: BodyModel) -> dict[str, dict[str, int]]:
@@ -142,11 +156,17 @@ def _may_swap(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
 
 
 def continuous_angles(motion: Motion) -> Array:
-    """Return the joint angles (n, joints, 3) [rad], each row on the branch nearest to the last known row before it."""
+    """Return the joint angles (n, joints, 3) [rad], each row on the branch nearest to the last known row before it.
+
+    Whole turns are added so that the mean of each curve lies within half a turn of zero, if it is shorter than a turn.
+    """
     angles = np.array(motion.joint_angles)
     rows = np.flatnonzero(motion.has_pose)
     for before, row in pairwise(rows):
         angles[row] = nearest_angles(angles[row], angles[before])
+    if len(rows):
+        turns = np.round(angles[rows].mean(axis=0) / (2 * np.pi))
+        angles[rows] -= 2 * np.pi * turns * (np.ptp(angles[rows], axis=0) < 2 * np.pi)
     return angles
 
 

@@ -56,8 +56,8 @@ def label_joints(motion: Motion, model: BodyModel) -> xr.Dataset:
     variables = {
         "position": (("time", "joint", "space"), points, _METRES),
         "position_sd": (("time", "joint"), sd, _SD),
-        "status": (("time",), motion.status),
-        "joint_status": (("time", "joint"), joint_statuses(motion, model, sd)),
+        "status": (("time",), motion.status, {"of": "frame"}),
+        "joint_status": (("time", "joint"), joint_statuses(motion, model, sd), {"of": "joint"}),
     }
     coordinates = {
         "time": ("time", motion.time_s, {"units": "s"}),

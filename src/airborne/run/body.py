@@ -12,6 +12,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from airborne.body import BodyModel, Pose
 from airborne.body.files import mesh_files, write_body
 from airborne.body_fitting.first_frames import EVERY, N_FRAMES, fit_preset
@@ -21,6 +24,7 @@ from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
+from airborne.motion.joints import doubtful_segments, joint_statuses, landmarks
 from airborne.motion.run_folder import BODY, MOTION, TRACKED_MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
 from airborne.run.body_passes import BodyPasses
@@ -33,7 +37,7 @@ from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.run.whole_run import FittedRun, fit_whole_run
 from airborne.tracking import Estimate
-from airborne.tracking.estimate import Status, doubtful_segments
+from airborne.tracking.estimate import Status
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.self_check.kept_frames import KeptFrames
@@ -165,8 +169,7 @@ class BodyRun:
 
     def writer(self, folder: Path, *, resume: bool) -> MotionWriter:
         """Return what writes the estimates."""
-        joints = tuple(segment.name for segment in self.model.segments[1:])
-        return MotionWriter(folder / self.table, joints, resume=resume)
+        return MotionWriter(folder / self.table, self.names[1:], resume=resume)
 
     def write(self, writer: MotionWriter, estimate: Estimate) -> None:
         """Write one time's estimate."""
@@ -185,16 +188,26 @@ class BodyRun:
         yield ContactSheet(figures_of(folder) / "through_mask.png", recording.rig)
         yield MatchingPicture(figures_of(folder) / "matching.png", recording.rig)
 
-    def draw(self, artists: Sequence[Any], frames: Frames, estimate: Estimate) -> None:
-        """Let the artists draw one time; a start that failed is shown where it was set."""
+    def draw(
+        self, artists: Sequence[Any], frames: Frames, estimate: Estimate, doubtful: NDArray[np.bool_] | None = None
+    ) -> None:
+        """Let the artists draw one time; a start that failed is shown where it was set.
+
+        doubtful (segments,): None where the estimate alone says which are.
+        """
         is_first = frames.index == self.trial.start.frame
         pose = self.start if is_first and estimate.pose is None else estimate.pose
         posed = None if pose is None else self.model.with_pose(pose)
+        if doubtful is None and self.model.has_joints:
+            (doubtful,) = self._doubtful_segments(Motion.collect([estimate], self.names[1:]))
         for artist in artists:
             if isinstance(artist, OverlayVideos):
-                artist.write(frames, posed, estimate.status, doubtful_segments(estimate, self.model))
+                artist.write(frames, posed, estimate.status, doubtful)
             else:
                 artist.write(frames, posed, estimate.status)
+
+    def _doubtful_segments(self, motion: Motion) -> NDArray[np.bool_]:
+        return doubtful_segments(joint_statuses(motion, self.model, landmarks(motion, self.model)[1]), self.model)
 
     def keep(self, frames: Frames) -> None:
         """Keep some frames, spread over the run, for the self-check."""
@@ -262,12 +275,14 @@ class BodyRun:
     def _draw_again(self, folder: Path, drawn: OverlaysAs, progress: Progress | None) -> None:
         """Draw every time with the estimate that the run ended with."""
         estimates = {estimate.index: estimate for estimate in read_estimates(folder / self.table)}
+        motion = read_motion(folder / self.table)
+        doubtful = dict(zip(motion.index.tolist(), self._doubtful_segments(motion), strict=True))
         with ExitStack() as stack:
             artists = [stack.enter_context(artist) for artist in self._all_artists(folder, drawn)]
             drawing = stack.enter_context(DrawingThread(partial(self.draw, artists)))
             for frames in Rereading(self.recording).forward(min(estimates), max(estimates) + 1):
                 if frames.index in estimates:
-                    drawing.put(frames, estimates[frames.index])
+                    drawing.put(frames, estimates[frames.index], doubtful[frames.index])
                 if progress is not None:
                     progress(frames.index - min(estimates) + 1, max(estimates) - min(estimates) + 1)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from airborne.export.tables import Columns, body_columns, players_columns, write
 from airborne.export.takes import Take, body_take, player_takes, portable_names, with_axis_markers
 from airborne.export.trc import write_trc
 from airborne.io.parquet import CAN_WRITE_PARQUET
+from airborne.io.writing import explain_full_disk
 from airborne.motion import Motion, has_inertias, landmarks, measure_flight
 from airborne.motion.run_folder import holds_players, note_if_unfinished, read_body_run, read_players_run
 from airborne.types import Array, Progress, StageProgress
@@ -78,22 +80,30 @@ def export_run(
     target.mkdir(parents=True, exist_ok=True)
     stem = portable_names([folder.resolve().name])[0]
     files: list[Path] = []
-    for done, format in enumerate(wanted):
-        say(f"writing {format}", done, len(wanted))
-        files += _write(format, target, stem, read)
+    with TemporaryDirectory(prefix=".", dir=target) as unfinished_files:
+        for done, format in enumerate(wanted):
+            say(f"writing {format}", done, len(wanted))
+            with explain_full_disk(target / f"{stem}.{format}"):
+                whole = _write(format, Path(unfinished_files), stem, read)
+            files += [path.replace(target / path.name) for path in whole]
     unfinished = [note for note in [note_if_unfinished(folder)] if note is not None]
-    gaps = _gap_notes(read.takes, bool({"mot", "bvh"} & set(wanted)))
+    gaps = _gap_notes(read.takes, wanted)
     return ExportResult(tuple(files), (*notes, *gaps, *unfinished))
 
 
-def _gap_notes(takes: Sequence[Take], has_parts: bool) -> Iterator[str]:
-    """Say for each body in how many frames it has no pose."""
+def _gap_notes(takes: Sequence[Take], wanted: Sequence[str]) -> Iterator[str]:
+    """Say for each body in how many frames it has no pose, and how many of its points are unknown."""
+    has_parts = bool({"mot", "bvh"} & set(wanted))
     for take in takes:
         n, n_parts = int(np.sum(~take.has_pose)), len(take.stretches())
         who = f"{take.name}: " if take.name else ""
         parts = f"; .mot and .bvh are in {n_parts} parts, one a stretch without a gap" * (has_parts and n_parts > 1)
         if n:
             yield f"{who}{n} of {len(take)} frames have no pose and stay gaps{parts}"
+        n_unknown = int(np.sum(np.isinf(take.sd)))
+        if n_unknown:
+            share = f"{n_unknown} of {take.sd.size} points are unknown, what stands for them is a guess"
+            yield f"{who}{share}: gaps in .trc, the largest residual in .c3d, unmarked in .mot, .bvh and .glb"
 
 
 def _read(folder: Path, has_tables: bool, progress: Progress) -> _RunData:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from airborne.body import BodyModel, Pose
 from airborne.tracking.backward import turn_estimate, turn_time
-from airborne.tracking.estimate import Estimate, Status, doubtful_segments
+from airborne.tracking.estimate import Estimate, Status, has_unknown_limb
 from airborne.tracking.passes import Passes, differences, join_passes
 from airborne.tracking.tracker import Tracker
 from airborne.types import Array
@@ -195,5 +195,5 @@ def _track_both_ways(
 
 
 def _is_doubtful(model: BodyModel, estimate: Estimate) -> bool:
-    """Whether a frame is not tracked, or some limb may not be where it is said to be."""
-    return estimate.status is not Status.TRACKED or bool(doubtful_segments(estimate, model).any())
+    """Whether a frame is not tracked, or the images do not show some limb where it is said to be."""
+    return estimate.status is not Status.TRACKED or has_unknown_limb(estimate, model)

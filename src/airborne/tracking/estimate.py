@@ -8,7 +8,6 @@ from enum import StrEnum
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.types import Array
@@ -53,13 +52,7 @@ def lost_estimate(index: int, time_s: Fraction) -> Estimate:
     return Estimate(index=index, time_s=time_s, status=Status.LOST, score=np.nan, pose=None, covariance=None, n_views=0)
 
 
-def doubtful_segments(estimate: Estimate, model: BodyModel) -> NDArray[np.bool_]:
-    """Return which segments (segments,) hang on a joint that the images do not show, or have an uncertain end."""
-    doubtful = np.zeros(len(model.segments), np.bool_)
-    if estimate.covariance is not None and len(estimate.covariance) == model.n_dofs:
-        doubtful[1:] = np.isinf(np.diagonal(estimate.covariance)[6:]).reshape(-1, 3).any(axis=1)
-        for segment, parent in enumerate(model.parents[1:], start=1):
-            doubtful[segment] |= doubtful[parent]
-    for joint in estimate.uncertain_joints:
-        doubtful[[1 + joint, model.parents[1 + joint]]] = True
-    return doubtful
+def has_unknown_limb(estimate: Estimate, model: BodyModel) -> bool:
+    """Say whether the images do not show some joint of the body."""
+    covariance = estimate.covariance
+    return covariance is not None and len(covariance) == model.n_dofs and bool(np.isinf(covariance[6:, 6:]).any())
