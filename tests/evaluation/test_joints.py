@@ -96,7 +96,7 @@ def test_errors_of_one_landmark_are_its_own():
 
 
 def test_lost_frames_are_counted_and_uncertain_ones_separately():
-    motion = run(lost=[3, 4])
+    motion = run(lost=[3, 4], covariance=small_covariance(MODEL))
     status = motion.status.astype("<U9")
     status[7] = Status.UNCERTAIN.value
     reference = paths()

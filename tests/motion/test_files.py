@@ -298,7 +298,7 @@ def test_exact_time_does_not_pass_through_a_float(tmp_path):
         (lambda text: text.replace("frame,time_s", "field,time"), "has no column frame, time_s"),
         (lambda text: text.replace("frame,time_s", "time_s,frame"), "columns in another order"),
         (lambda text: "", "is empty"),
-        (lambda text: text.replace(",tracked,", ",found,"), "line 2: 'found'"),
+        (lambda text: text.replace(",tracked,", ",found,"), "line 2: status is 'found', expected tracked"),
         (lambda text: text.replace("\n1,", "\n1,1,"), "line 3: .* cells, expected"),
         (lambda text: text.replace("\n1,", "\n0,"), "line 3: frame 0 a second time"),
         (lambda text: text.replace("\n1,", "\nx,"), "line 3: .*'x'"),

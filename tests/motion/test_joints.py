@@ -76,7 +76,7 @@ def test_joint_angles_continue_over_full_revolutions_and_lost_frames():
 def test_angles_that_begin_beyond_half_a_turn_are_brought_back_by_whole_turns():
     """As of arms that are lowered from overhead: 183 to 325 degrees are -177 to -35."""
     x = np.radians(np.linspace(183, 325, 30))
-    motion = motion_of(MODEL, bent(x, np.zeros(30), np.zeros(30)))
+    motion = motion_of(MODEL, bent(*np.stack([x, 0 * x, 0 * x], axis=-1)))
     result = joint_angles(motion, MODEL)["angle"].sel(joint="head", axis="x").to_numpy()
     np.testing.assert_allclose(result, np.rad2deg(x) - 360, atol=1e3 * ROUNDTRIP)
 

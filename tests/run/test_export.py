@@ -1,5 +1,6 @@
 """`airborne export`: whatever a run holds, finished or not, goes out; what is no run is refused in one line."""
 
+import errno
 import json
 import re
 import sys
@@ -12,7 +13,9 @@ from airborne import cli
 from airborne.body.files import write_body
 from airborne.errors import ResultError
 from airborne.evaluation import read_joint_paths
+from airborne.export.takes import with_axis_markers
 from airborne.motion import MotionWriter, landmarks, read_players
+from airborne.run import export
 from airborne.run.export import EXPORT_FORMATS, export_run
 from airborne.tracking import Estimate, Status
 from tests.support.export_scenes import BOX, PERSON
@@ -58,6 +61,32 @@ def players_run(tmp_path_factory):
 
 def names(exported):
     return [path.name for path in exported.files]
+
+
+def test_a_full_disk_is_told_with_the_file_and_leaves_no_torn_one(tmp_path, monkeypatch):
+    def fill(path, columns):
+        path.write_bytes(b"torn")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    write_body_run(tmp_path / "run", tumbling(), PERSON)
+    monkeypatch.setattr(export, "write_csv", fill)
+    with pytest.raises(
+        ResultError, match=r"out/run\.csv cannot be written \(No space left on device\): \d+ MB are free"
+    ):
+        export_run(tmp_path / "run", tmp_path / "out", ["csv"])
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_points_that_the_images_do_not_show_are_noted(tmp_path):
+    motion = tumbling()
+    forearm = slice(3 + 3 * PERSON.index_of("forearm_left"), 6 + 3 * PERSON.index_of("forearm_left"))
+    motion.covariance[:] = 1e-4 * np.eye(PERSON.n_dofs)
+    motion.covariance[2, forearm, forearm] = np.diag([np.inf] * 3)
+    write_body_run(tmp_path / "run", motion, PERSON)
+    notes = export_run(tmp_path / "run", tmp_path / "out", ["trc"]).notes
+    n_markers = len(with_axis_markers(PERSON).landmarks)
+    said = f"2 of {len(motion) * n_markers} points are unknown, what stands for them is a guess: gaps in .trc"
+    assert any(note.startswith(said) for note in notes), notes
 
 
 def test_a_killed_run_of_a_person_is_exported_in_every_format(person_run, tmp_path):

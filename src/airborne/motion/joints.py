@@ -89,9 +89,9 @@ def _place_variance(model: BodyModel, owners: NDArray[np.int64]) -> Array:
 def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.str_]:
     """Return how far each landmark can be trusted in each frame: (n, landmarks), values of `JointStatus`.
 
-    sd (n, landmarks) [m] as `landmarks` gives it; where that is unknown none is tracked. A joint that may be elsewhere makes the landmarks of its segment
-    uncertain, one beyond its limits for several frames on end those that hang on it, and crossed legs that fewer than
-    three cameras show make theirs.
+    sd (n, landmarks) [m] as `landmarks` gives it; where that is unknown none is tracked. A joint that may be elsewhere
+    makes the landmarks of its segment uncertain, one beyond its limits for several frames on end those that hang on it,
+    and crossed legs that fewer than three cameras show make theirs.
     """
     status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
     owners = [model.index_of(landmark.segment) for landmark in model.landmarks]

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -80,12 +79,9 @@ def export_run(
     target.mkdir(parents=True, exist_ok=True)
     stem = portable_names([folder.resolve().name])[0]
     files: list[Path] = []
-    with TemporaryDirectory(prefix=".", dir=target) as unfinished_files:
-        for done, format in enumerate(wanted):
-            say(f"writing {format}", done, len(wanted))
-            with explain_full_disk(target / f"{stem}.{format}"):
-                whole = _write(format, Path(unfinished_files), stem, read)
-            files += [path.replace(target / path.name) for path in whole]
+    for done, format in enumerate(wanted):
+        say(f"writing {format}", done, len(wanted))
+        files += _write(format, target, stem, read)
     unfinished = [note for note in [note_if_unfinished(folder)] if note is not None]
     gaps = _gap_notes(read.takes, wanted)
     return ExportResult(tuple(files), (*notes, *gaps, *unfinished))
@@ -170,7 +166,12 @@ def _write(format: str, folder: Path, stem: str, read: _RunData) -> list[Path]:
     }
     if format in together:
         path = folder / f"{stem}.{'glb' if format == 'gltf' else format}"
-        together[format](path)
+        try:
+            with explain_full_disk(path):
+                together[format](path)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
         return [path]
     written: list[Path] = []
     for take in read.takes:
