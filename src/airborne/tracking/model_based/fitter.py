@@ -247,7 +247,8 @@ class Fitter:
         somersaults no second place was better. The prior is returned too, wide for a limb that was moved.
         """
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
-        places = search_limb(self.render_model, [fit.pose, *expected], limb, learned.evidence)
+        args = self.render_model, [fit.pose, *expected], limb, learned.evidence
+        places = search_limb(*args, shared=fit.equations.shared)
         if not places:
             return fit, prior
         dofs, masks, coarse = joints_of(self.model, limb), learned.masks, len(NEAR) - 1
