@@ -1,6 +1,6 @@
 """A body is tracked forward and backward without any key: what one direction loses, the other has."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -75,6 +75,25 @@ def test_an_arm_that_is_lost_is_where_the_backward_pass_has_it_and_as_uncertain_
 def test_where_nothing_is_in_doubt_the_body_is_tracked_forward_alone():
     pose = found_by(LosesAnArm(doubts=False))[LOST.start].pose
     np.testing.assert_allclose(delta_between(with_arm(1.0), pose), 0, atol=1e-9)
+
+
+@dataclass(frozen=True)
+class TurnsRound(LosesAnArm):
+    """A tracker that turns the body round on the way forward, which going back it does not undo."""
+
+    from_frame: int = 6
+
+    def search(self, state, frames):
+        found = super().search(state, frames)
+        is_round = state < 0 or frames.index >= self.from_frame
+        elsewhere = TRUTH.move(np.zeros(3), np.array([0.0, 0.0, np.pi]))
+        return replace(found, pose=elsewhere if is_round else TRUTH)
+
+
+def test_where_the_way_back_does_not_end_at_the_known_start_no_frame_is_tracked():
+    estimates = found_by(TurnsRound())
+    assert [each.status for each in estimates] == [Status.TRACKED, *[Status.UNCERTAIN] * (N - 1)]
+    assert {each.status for each in found_by(LosesAnArm())[1:]} == {Status.TRACKED}
 
 
 @pytest.mark.parametrize("gone", [(N - 1,), (N - 2, N - 1), (0,), tuple(range(N)), (5, 6)])
