@@ -74,7 +74,7 @@ def test_points_of_unknown_deviation_are_uncertain_where_the_frame_is_tracked():
 def test_segments_beside_a_joint_that_is_not_tracked_are_doubtful():
     run = motion(n=2)
     run.uncertain_joints[1, JOINTS.index("shank_left")] = True
-    doubtful = doubtful_segments(joint_statuses(run, HUMAN, landmarks(run, HUMAN)[1]), HUMAN)
+    doubtful = doubtful_segments(run, HUMAN)
     assert not doubtful[0].any()
     assert {HUMAN.segments[k].name for k in np.flatnonzero(doubtful[1])} == {"thigh_left", "shank_left"}
 

@@ -102,12 +102,10 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
     return status
 
 
-def doubtful_segments(status: NDArray[np.str_], model: BodyModel) -> NDArray[np.bool_]:
-    """Return which segments have a landmark, or an end, that is not tracked: (n, segments).
-
-    status (n, landmarks) is that of `joint_statuses`.
-    """
-    doubtful = np.zeros((len(status), len(model.segments)), np.bool_)
+def doubtful_segments(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
+    """Return which segments have a landmark, or an end, that is not tracked: (n, segments)."""
+    status = joint_statuses(motion, model, landmarks(motion, model)[1])
+    doubtful = np.zeros((len(motion), len(model.segments)), np.bool_)
     for landmark, is_doubtful in zip(model.landmarks, (status != JointStatus.TRACKED.value).T, strict=True):
         segment = model.index_of(landmark.segment)
         doubtful[:, segment] |= is_doubtful

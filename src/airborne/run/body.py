@@ -24,7 +24,7 @@ from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
-from airborne.motion.joints import doubtful_segments, joint_statuses, landmarks
+from airborne.motion.joints import doubtful_segments
 from airborne.motion.run_folder import BODY, MOTION, TRACKED_MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
 from airborne.run.body_passes import BodyPasses
@@ -199,15 +199,12 @@ class BodyRun:
         pose = self.start if is_first and estimate.pose is None else estimate.pose
         posed = None if pose is None else self.model.with_pose(pose)
         if doubtful is None and self.model.has_joints:
-            (doubtful,) = self._doubtful_segments(Motion.collect([estimate], self.names[1:]))
+            (doubtful,) = doubtful_segments(Motion.collect([estimate], self.names[1:]), self.model)
         for artist in artists:
             if isinstance(artist, OverlayVideos):
                 artist.write(frames, posed, estimate.status, doubtful)
             else:
                 artist.write(frames, posed, estimate.status)
-
-    def _doubtful_segments(self, motion: Motion) -> NDArray[np.bool_]:
-        return doubtful_segments(joint_statuses(motion, self.model, landmarks(motion, self.model)[1]), self.model)
 
     def keep(self, frames: Frames) -> None:
         """Keep some frames, spread over the run, for the self-check."""
@@ -276,7 +273,7 @@ class BodyRun:
         """Draw every time with the estimate that the run ended with."""
         estimates = {estimate.index: estimate for estimate in read_estimates(folder / self.table)}
         motion = read_motion(folder / self.table)
-        doubtful = dict(zip(motion.index.tolist(), self._doubtful_segments(motion), strict=True))
+        doubtful = dict(zip(motion.index.tolist(), doubtful_segments(motion, self.model), strict=True))
         with ExitStack() as stack:
             artists = [stack.enter_context(artist) for artist in self._all_artists(folder, drawn)]
             drawing = stack.enter_context(DrawingThread(partial(self.draw, artists)))
