@@ -95,8 +95,8 @@ def test_search_for_a_limb_brings_it_near_and_moves_nothing_else(frame, name):
 @pytest.mark.parametrize("name", FOLDS)
 def test_limb_that_has_clearly_most_evidence_where_it_is_has_no_other_place(frame, name):
     args = frame.render_model, [frame.truth], limb_with(name), region_evidence(*frame.views(frame.truth))
-    assert search_limb(*args, shared=SHARED) == []
-    assert search_limb(*args, shared=1e9)  # all evidence is next to none
+    assert search_limb(*args, shared=SHARED) == [frame.truth]
+    assert len(search_limb(*args, shared=1e9)) > 1  # all evidence is next to none
 
 
 @pytest.mark.parametrize("name", ["upper_arm_left", "thigh_right", "forearm_right"])

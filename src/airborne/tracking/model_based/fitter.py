@@ -249,8 +249,6 @@ class Fitter:
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
         args = self.render_model, [fit.pose, *expected], limb, learned.evidence
         places = search_limb(*args, shared=fit.equations.shared)
-        if not places:
-            return fit, prior
         dofs, masks, coarse = joints_of(self.model, limb), learned.masks, len(NEAR) - 1
         poses = [fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs) for pose in places]
         best = max(poses, key=lambda pose: self.agreement(pose, learned).evidence)

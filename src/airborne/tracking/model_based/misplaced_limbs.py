@@ -29,8 +29,8 @@ _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
 DISTINCT_M = 0.1  # two places of a limb, of which some joint is this far apart: about the width of an arm
 SAME_M = 0.02  # fits from two places of a limb that are no further apart end in the same
-# of all places elsewhere, before a search ends at its starts: of 657 searches for people of two and three views 271 do,
-# of which 3 would have moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up to 0.6 m
+# of all places elsewhere, before a search ends at its starts: of 657 searches for people in two and three views 271 do,
+# of which 3 moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up to 0.6 m
 _CLEARLY_LESS_NATS = 1.0
 _FEWEST_PX = 25  # a segment with fewer visible pixels in a view is occluded there, not misplaced
 _MISPLACED = 0.5  # share of the body's precision, below which a segment is misplaced
@@ -60,8 +60,8 @@ def search_limb(
     """Return the poses with the most evidence when one limb moves from where the given poses have it.
 
     The poses differ in that limb only, and each from every other. The search starts from all over the joints' ranges
-    too; none is returned where all that lie elsewhere have clearly less evidence than the first pose. `shared`: how
-    many pixels are as much evidence as one by itself.
+    too; the first pose alone is returned where all that lie elsewhere have clearly less evidence. `shared`: how many
+    pixels are as much evidence as one by itself.
     """
     joints, root = limb - 1, poses[0].world_from_root
     angles = np.stack([pose.joint_angles for pose in poses])  # (candidates, joints, 3)
@@ -75,7 +75,7 @@ def search_limb(
     scores, places = search.weigh(anywhere)
     is_elsewhere = np.linalg.norm(places - places[0], axis=2).max(axis=1) > DISTINCT_M
     if scores[0] - scores[is_elsewhere].max(initial=-np.inf) > _CLEARLY_LESS_NATS * shared:
-        return []
+        return [poses[0]]
     angles = anywhere[_distinct_places(np.argsort(-scores, kind="stable"), places, DISTINCT_M, _N_FIRST)]
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
         steps = ndtri(sobol_points(3 * len(limb), n_proposals, seed=number)) * reach / 2**number
