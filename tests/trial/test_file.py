@@ -234,6 +234,14 @@ def test_malformed_file_is_refused_in_one_line_that_names_it_and_the_fault(folde
     assert said in complaint(folder, GOOD.replace(old, new, 1))
 
 
+def test_misspelt_key_of_the_body_is_the_only_complaint_where_no_method_is_given(folder):
+    """Which methods go with a body that is wrong is not known."""
+    text = GOOD[: GOOD.index("[track]")].replace("[body]", "[body]\nstatur_m = 1.8", 1)
+    said = complaint(folder, text)
+    assert "body.statur_m: unknown key; did you mean stature_m?" in said
+    assert "track" not in said
+
+
 PLACES = "joints_m = {a = [1, 2, 3], b = [4, 5, 6]}"
 
 
