@@ -235,7 +235,7 @@ def parse_line(path: Path, line: bytes, joints: tuple[str, ...]) -> Estimate:
 
 def _estimate(row: dict[str, str], joints: tuple[str, ...], full: NDArray[np.float64] | None) -> Estimate:
     """Make an estimate from a row of motion.csv and, for a body with joints, its row of covariance.bin."""
-    if row["status"] not in set(Status):
+    if row["status"] not in tuple(Status):
         raise ValueError(f"status is '{row['status'][:40]}', expected {', '.join(Status)}")
     status = Status(row["status"])
     position = _numbers(row, ["x_m", "y_m", "z_m"])

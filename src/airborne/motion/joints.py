@@ -66,7 +66,7 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     direction moves it, NaN where unknown. Raises ResultError for another body.
     """
     require_body(motion, model)
-    owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
+    owners = _owners(model)
     points = np.full((len(motion), len(owners), 3), np.nan)
     variance, at_joint = np.full(points.shape, np.nan), _at_joint(model)
     covariance = motion.total_covariance
@@ -94,7 +94,7 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
     and crossed legs that fewer than three cameras show make theirs.
     """
     status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
-    owners = [model.index_of(landmark.segment) for landmark in model.landmarks]
+    owners = _owners(model)
     is_doubtful = ~(sd <= UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)] | _may_swap(motion, model)
     is_doubtful |= np.pad(motion.uncertain_joints, ((0, 0), (1, 0)))[:, owners]
     status[(status == JointStatus.TRACKED.value) & is_doubtful] = JointStatus.UNCERTAIN.value
@@ -124,8 +124,13 @@ def count_statuses(status: NDArray[np.str_], model: BodyModel) -> dict[str, dict
 
 def _carriers(model: BodyModel) -> NDArray[np.int64]:
     """Return the segment whose joint moves each landmark, the parent of a segment for its origin: (landmarks,)."""
-    owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
+    owners = _owners(model)
     return np.where(_at_joint(model) & (owners > 0), model.parents[owners], owners)
+
+
+def _owners(model: BodyModel) -> NDArray[np.int64]:
+    """Return the segment of each landmark: (landmarks,)."""
+    return np.array([model.index_of(landmark.segment) for landmark in model.landmarks], np.int64)
 
 
 def _at_joint(model: BodyModel) -> NDArray[np.bool_]:
@@ -149,7 +154,7 @@ def _may_swap(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     rows, crossed = np.flatnonzero(motion.has_pose & (motion.n_views < _SURE_VIEWS)), np.zeros(len(motion), np.bool_)
     joints_m = model.pose_segments(motion.R[rows], motion.position[rows], motion.joint_angles[rows])[1]
     crossed[rows] = are_crossed(model, joints_m)
-    owners = [model.index_of(landmark.segment) for landmark in model.landmarks]
+    owners = _owners(model)
     return crossed[:, None] & np.isin(owners, [segment for legs in paired_legs(model) for segment in legs.ravel()])
 
 

@@ -35,7 +35,8 @@ def motion_columns(motion: Motion) -> dict[str, NDArray]:
     columns |= {f"q{axis}": motion.quaternion[:, k] for k, axis in enumerate("xyzw")}
     columns |= {f"{axis}_m_sd": motion.position_sd[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"r{axis}_deg_sd": np.rad2deg(motion.rotation_sd[:, k]) for k, axis in enumerate("xyz")}
-    uncertain = ["/".join(np.array(motion.joints)[is_uncertain]) for is_uncertain in motion.uncertain_joints]
+    joints = np.array(motion.joints)
+    uncertain = ["/".join(joints[is_uncertain]) for is_uncertain in motion.uncertain_joints]
     return columns | {"n_views": motion.n_views, "uncertain_joints": np.array(uncertain, np.str_)}
 
 

@@ -245,7 +245,7 @@ class BodyRun:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
         measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
-            self._draw_again(folder, drawn, progress_of("drawing"))
+            self._draw_again(folder, drawn, motion, progress_of("drawing"))
         self.recording.events.extend(checked.doubts)
         is_exact = self.calibration is None
         return motion, {
@@ -269,10 +269,9 @@ class BodyRun:
             copy_motion(folder / self.table, folder / TRACKED_MOTION)
         return fitted
 
-    def _draw_again(self, folder: Path, drawn: OverlaysAs, progress: Progress | None) -> None:
+    def _draw_again(self, folder: Path, drawn: OverlaysAs, motion: Motion, progress: Progress | None) -> None:
         """Draw every time with the estimate that the run ended with."""
         estimates = {estimate.index: estimate for estimate in read_estimates(folder / self.table)}
-        motion = read_motion(folder / self.table)
         doubtful = dict(zip(motion.index.tolist(), doubtful_segments(motion, self.model), strict=True))
         with ExitStack() as stack:
             artists = [stack.enter_context(artist) for artist in self._all_artists(folder, drawn)]

@@ -16,11 +16,10 @@ from airborne.types import Array
 from airborne.video import Frames
 
 _MOST_BYTES = 6e8  # of pictures of a stretch that are held at once, as if converted
-# of the segments after the root, of a person two limbs: of synthetic people in two and three views 386 joints are then
-# tracked with bodies a tenth too tall, none of them 0.1 m off, and 1521, of which 60 are, without; with right bodies
-# 10503 and 10798, of which none is
-_ELSEWHERE_SHARE = 0.35
 _FEWEST_HELD = 16  # frames, whatever their bytes: limbs are lost for as long
+_ELSEWHERE_SHARE = 0.35  # of the segments after the root, of a person two limbs; chosen on synthetic people in two and
+# three views: 386 joints are then tracked with bodies a tenth too tall, none of them 0.1 m off, and 1521, of which 60
+# are, without; with right bodies 10503 and 10798, of which none is
 
 
 class TurningTracker(Tracker[Any, Estimate], Protocol):
@@ -196,9 +195,12 @@ def _track_both_ways(
         report(len(forward) + len(passes))
     found = {**forward, **{estimate.index: estimate for estimate in join_passes(model, passes[::-1])}}
     if only_if_doubtful and _ends_elsewhere(passes):
-        statuses = {index: worst_status([each.status, Status.UNCERTAIN]) for index, each in found.items()}
-        found = {index: replace(each, status=statuses[index]) for index, each in found.items()}
+        return {index: _doubt(each) for index, each in found.items()}, None
     return found, None
+
+
+def _doubt(estimate: Estimate) -> Estimate:
+    return replace(estimate, status=worst_status([estimate.status, Status.UNCERTAIN]))
 
 
 def _ends_elsewhere(passes: Sequence[Passes]) -> bool:

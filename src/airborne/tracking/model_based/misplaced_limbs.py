@@ -29,9 +29,11 @@ _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
 DISTINCT_M = 0.1  # two places of a limb, of which some joint is this far apart: about the width of an arm
 SAME_M = 0.02  # fits from two places of a limb that are no further apart end in the same
-# of all places elsewhere, before a search ends at its starts: of 657 searches for people in two and three views 271 do,
-# of which 3 moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up to 0.6 m
-_CLEARLY_LESS_NATS = 1.0
+_CLEARLY_LESS_NATS = (
+    1.0  # of all places elsewhere, before a search ends at its starts; chosen on synthetic people in two
+)
+# and three views: of 657 searches 271 end, of which 3 moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up
+# to 0.6 m
 _FEWEST_PX = 25  # a segment with fewer visible pixels in a view is occluded there, not misplaced
 _MISPLACED = 0.5  # share of the body's precision, below which a segment is misplaced
 
@@ -76,7 +78,7 @@ def search_limb(
     is_elsewhere = np.linalg.norm(places - places[0], axis=2).max(axis=1) > DISTINCT_M
     if scores[0] - scores[is_elsewhere].max(initial=-np.inf) > _CLEARLY_LESS_NATS * shared:
         return [poses[0]]
-    angles = anywhere[_distinct_places(np.argsort(-scores, kind="stable"), places, DISTINCT_M, _N_FIRST)]
+    angles = anywhere[_most_evident(scores, places, _N_FIRST)]
     for number, (n_proposals, n_survivors) in enumerate(_ROUNDS):
         steps = ndtri(sobol_points(3 * len(limb), n_proposals, seed=number)) * reach / 2**number
         proposed = angles[np.arange(n_proposals) % len(angles)]
@@ -84,8 +86,7 @@ def search_limb(
         turned = compose_rotation_vectors(angles_of_limb, steps.reshape(-1, 3)).reshape(n_proposals, len(limb), 3)
         proposed[:, joints] = angles_near(limits.clamp(matrix_from_angles(turned)), turned)
         proposed = np.concatenate([angles, proposed])
-        scores, places = search.weigh(proposed)
-        angles = proposed[_distinct_places(np.argsort(-scores, kind="stable"), places, DISTINCT_M, n_survivors)]
+        angles = proposed[_most_evident(*search.weigh(proposed), n_survivors)]
     return [replace(poses[0], joint_angles=each) for each in angles]
 
 
@@ -126,6 +127,11 @@ class _LimbSearch:
         t = np.broadcast_to(self.root.translation, (len(angles), 3))
         R, t = self.model.pose_segments(R, t, angles)
         return mask_evidence(self.surface, self.maps, R, t).sum(axis=1), t[:, self.limb]
+
+
+def _most_evident(scores: Array, places: Array, n: int) -> NDArray[np.int64]:
+    """Return which n of the scores (m,) are the highest, best first, of places (m, joints, 3) [m] that are distinct."""
+    return _distinct_places(np.argsort(-scores, kind="stable"), places, DISTINCT_M, n)
 
 
 @kernel
