@@ -15,7 +15,7 @@ from airborne.motion import read_motion
 from tests.support.commands import in_process, refusal
 from tests.support.example_trial import CALIBRATED, LONG, SHORT, edit_trial
 from tests.support.players_trial import write_run, write_truth
-from tests.support.run_files import files_of
+from tests.support.run_files import contents_of, files_of
 
 KILLED_AFTER = 4  # rows
 PATIENCE_S = 120
@@ -97,6 +97,19 @@ def test_evaluate_compares_with_the_truth_and_with_clicks(trial, short_run, caps
     assert result["truth"]["n_matched"] == SHORT
     assert result["truth"]["position"]["rms_3d_mm"] < 10
     assert result["digitised"]["tracked_minus_digitised"]["n_matched"] == SHORT
+
+
+def test_a_finished_run_that_is_resumed_stays_as_it_is(trial, short_run, tmp_path, capsys):
+    run = tmp_path / "run"
+    shutil.copytree(short_run, run)
+    assert in_process("evaluate", run, trial.parent / "truth.csv") == 0
+    before = contents_of(run)
+    capsys.readouterr()
+    assert in_process("track", trial, "-o", run, "--no-pictures", "--resume") == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == f"{run} holds this run, finished; nothing was tracked again (--overwrite tracks it anew)"
+    assert said[1].startswith(f"{SHORT} frames at ")
+    assert contents_of(run) == before
 
 
 def test_calibrate_writes_cameras_that_track_takes(trial, tmp_path, capsys):

@@ -1,5 +1,6 @@
 """What is compared: coordinates in mm, angles on the circle, at common times."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,13 +13,17 @@ from airborne.evaluation.variables import (
     align_symmetry,
     common_series,
     headline_series,
+    individuals_of,
     joint_angle_variables,
     jump_series,
+    motion_variables,
     point_variables,
     read_joint_angles,
     root_variables,
 )
 from tests.support.evaluation import HALF_TURN, flight, motion_of
+from tests.support.motions import figure, small_covariance, swinging
+from tests.support.motions import motion_of as motion_of_poses
 
 T = np.arange(40) / 50
 
@@ -88,6 +93,17 @@ def test_players_and_joints_are_individuals():
     assert set(result["hip x"].individual) == {"Anna", "Berta"}
     assert len(set(result["all joints z"].individual)) == 4
     assert [one.name for one in headline_series(list(result.values()))] == [f"all joints {axis}" for axis in "xyz"]
+    assert [individuals_of(name) for name in ("hip x", "all joints z")] == ["players", "joints"]
+
+
+def test_a_joint_that_no_image_shows_is_not_compared():
+    body, times = figure(), np.arange(6) / 50
+    motion = motion_of_poses(body, swinging(body, times), 50, small_covariance(body))
+    covariance, mark = np.array(motion.covariance), body.landmarks[-1]
+    covariance[2, 3 + 3 * body.index_of(mark.segment), 3 + 3 * body.index_of(mark.segment)] = np.inf
+    columns = motion_variables(replace(motion, covariance=covariance), body).columns
+    for axis in "xyz":
+        assert np.flatnonzero(np.isnan(columns[f"{mark.name} {axis}", "body"])).tolist() == [2]
 
 
 def test_joint_angles_of_both_branches_are_the_same_rotation():
@@ -133,3 +149,4 @@ def test_jumps_are_compared_in_millimetres_and_milliseconds_and_one_not_found_is
         np.testing.assert_allclose(one.values, [[550, 500], [np.nan, 250]])
         assert one.individual.tolist() == ["Anna jump 2"] * 2
     assert len(headline_series(series)) == len(series)
+    assert {individuals_of(one.name) for one in series} == {"jumps"}

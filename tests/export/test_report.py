@@ -119,6 +119,7 @@ def test_a_comparison_with_paths_of_joints_becomes_a_table(tmp_path):
     html = html_of(tmp_path, motion, joints=compare_joints(motion, PERSON, paths).to_dict())
     assert "Compared with the paths of the joints" in html
     assert html.count("<td>4</td><td>4</td><td>4</td>") == len(names) + 2  # all, and all tracked
+    assert "Joints tracked: 100%; of these more than 100 mm off: 0." in html
 
 
 def test_a_number_missing_from_the_summary_is_named(tmp_path):

@@ -1,7 +1,9 @@
 """`airborne check`: all mistakes of a trial at once, and nothing tracked; and the first frame alone."""
 
+import re
 import shutil
 
+import av
 import pytest
 
 from airborne.cli import main
@@ -41,6 +43,23 @@ def test_a_good_trial_has_a_line_for_each_thing(folder):
     assert checks.mistakes == []
     heads = ["trial.toml", "cam1", "cam2", "cam3", "videos", "calibration", "body", "frames", "start", "videos"]
     assert [line.split(": ")[0] for line in checks.well] == heads
+
+
+def test_a_video_that_was_not_copied_whole_says_so(folder):
+    path = folder / "cam2.mp4"
+    packets = folder / "whole.mp4"
+    path.rename(packets)
+    with av.open(str(packets)) as read, av.open(str(path), "w", options={"movflags": "faststart"}) as written:
+        stream = written.add_stream_from_template(read.streams.video[0])
+        for packet in read.demux(video=0):
+            if packet.size:
+                packet.stream = stream
+                written.mux(packet)
+    assert "cut off" not in " ".join(check_trial(folder / "trial.toml").well)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) * 2 // 3])
+    (line,) = (line for line in check_trial(folder / "trial.toml").well if line.startswith("cam2: "))
+    assert re.search(r"; cut off before its last \d images, copy it again$", line)
 
 
 def test_every_mistake_of_the_tables_is_listed(folder, capsys, monkeypatch):
@@ -115,7 +134,7 @@ def test_nothing_is_left_of_a_file_whose_tables_contradict_each_other(folder):
 def test_a_start_in_millimetres_is_a_mistake(folder):
     path = edit(folder, ("position_m = [-0.42419, -0.01495, 1.26533]", "position_m = [-424.19, -14.95, 1265.33]"))
     (mistake,) = check_trial(path).mistakes
-    assert "the start pose lies in no camera's image; check start.position_m, in metres" in mistake
+    assert "the start pose lies in no camera's image; check [start], in metres, and the calibration" in mistake
 
 
 def test_lines_are_reported_as_they_are_found(folder):

@@ -100,6 +100,8 @@ def track_command(
     if as_json:
         print((output / "summary.json").read_text(encoding="utf-8"), end="")
     else:
+        if run.was_finished:
+            print(f"{output} holds this run, finished; nothing was tracked again (--overwrite tracks it anew)")
         print(f"{_describe(run.summary, output)}\nresults: {_describe_results(output)}")
     if run.summary["n_frames"] == run.summary["n_lost"]:
         raise typer.Exit(1)

@@ -10,6 +10,7 @@ from airborne.evaluation.agreement import Agreement
 from airborne.evaluation.columns import align_columns
 from airborne.evaluation.compare import or_dash
 from airborne.evaluation.repeatability import Repeatability
+from airborne.evaluation.variables import individuals_of
 from airborne.motion.jumps.jump import Measurement
 
 _REFERENCES = (
@@ -79,11 +80,11 @@ def methods_text(
         text.append(
             "Bias is the mean of measured minus reference. The 95 % limits of agreement are bias ± 1.96 standard "
             "deviations of a single difference, the variance being the sum of that between and that within individuals "
-            "for a true value that varies (Bland and Altman 2007), with intervals by variance estimates recovery (Zou "
-            "2013). nRMSE is the root mean square error over the range of the reference. ICC(A,1) and ICC(C,1) are "
-            "two-way intraclass correlations of a single measurement for absolute agreement and for consistency "
-            "(McGraw and Wong 1996). SEM is the square root of the two-way residual mean square, and the minimal "
-            "detectable change 1.96 sqrt(2) SEM."
+            "(players, jumps or joints, as named) for a true value that varies (Bland and Altman 2007), with intervals "
+            "by variance estimates recovery (Zou 2013). nRMSE is the root mean square error over the range of the "
+            "reference. ICC(A,1) and ICC(C,1) are two-way intraclass correlations of a single measurement for absolute "
+            "agreement and for consistency (McGraw and Wong 1996). SEM is the square root of the two-way residual mean "
+            "square, and the minimal detectable change 1.96 sqrt(2) SEM."
         )
     if any(head.startswith(_BETWEEN) for head in results):
         text.append(
@@ -112,7 +113,7 @@ def _agreement_sentence(row: Agreement) -> str:
     if row.n < 2:
         count = "one value" if row.n else "no value"
         return f"{row.name}: {count}, measured minus reference {_ci(row.bias)} {row.unit}."
-    who = f"{row.n_individuals} individuals, " if row.n_individuals > 1 else ""
+    who = f"{row.n_individuals} {individuals_of(row.name)}, " if row.n_individuals > 1 else ""
     return (
         f"{row.name} ({who}n = {row.n}, effectively {row.n_effective:.0f}): bias {_ci(row.bias)} {row.unit}, limits "
         f"{_ci(row.lower_limit)} to {_ci(row.upper_limit)} {row.unit}, RMSE {_ci(row.rmse)} {row.unit}, nRMSE "

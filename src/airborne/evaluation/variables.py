@@ -24,7 +24,7 @@ from airborne.geometry.rotations import (
     unwrap,
     wrap,
 )
-from airborne.motion import Motion, PlayersMotion, landmarks
+from airborne.motion import Motion, PlayersMotion, known_landmarks
 from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.jumps.jump import Jump
 from airborne.types import Array
@@ -33,6 +33,7 @@ _Key = tuple[str, str]  # names of the variable and the individual
 
 BODY = "body"
 _POOLED = {"mm": "all joints", "deg": "all turns"}
+_JUMP = "jump "  # begins the names of what is measured of jumps
 _EXPECTED = "a table of joint angles with the columns time_s, <joint>_x_rad, <joint>_y_rad, <joint>_z_rad, ..."
 
 
@@ -89,8 +90,8 @@ def joint_angle_variables(time_s: Array, radians: Array, names: Sequence[str]) -
 
 
 def motion_variables(motion: Motion, model: BodyModel) -> Variables:
-    """Return all variables of one body: its root, landmarks and joint angles."""
-    points, _ = landmarks(motion, model)
+    """Return all variables of one body: its root, joint angles, and landmarks, NaN where no image shows them."""
+    points, *_ = known_landmarks(motion, model)
     variables = root_variables(motion.time_s, motion.position, motion.R)
     variables |= point_variables(motion.time_s, points, [landmark.name for landmark in model.landmarks])
     if motion.joints:
@@ -196,11 +197,16 @@ def jump_series(pairs: Sequence[tuple[Jump, Jump | None]]) -> list[Series]:
         ]
         stem, _, unit = name.rpartition("_")
         who = np.array([f"{true.player} jump {true.number}" for true, _ in pairs], np.str_)
-        series.append(Series(f"jump {stem}", f"m{unit}", 1e3 * np.array(values).reshape(-1, 2), who))
+        series.append(Series(f"{_JUMP}{stem}", f"m{unit}", 1e3 * np.array(values).reshape(-1, 2), who))
     return series
+
+
+def individuals_of(name: str) -> str:
+    """Say what the individuals of a series of this name are."""
+    return "jumps" if name.startswith(_JUMP) else "joints" if name.startswith(tuple(_POOLED.values())) else "players"
 
 
 def headline_series(series: Sequence[Series]) -> list[Series]:
     """Return the headline variables: the root's, the pooled ones, and jumps."""
     starts = (*"xyz", *ROOT_ANGLES)
-    return [one for one in series if one.name in starts or one.name.startswith((*_POOLED.values(), "jump "))]
+    return [one for one in series if one.name in starts or one.name.startswith((*_POOLED.values(), _JUMP))]

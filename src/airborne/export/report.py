@@ -224,7 +224,7 @@ def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
 def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
     rows = {**comparison["joints"], "all": comparison["whole"]}
     if comparison["tracked"]:
-        rows["all, tracked frames"] = comparison["tracked"]
+        rows["all, tracked"] = comparison["tracked"]
     keys = ("mean_mm", "rms_mm", "largest_mm", "mean_without_offset_mm")
     table = HtmlTable(
         [(name, *(each[key] for key in keys)) for name, each in rows.items()],
@@ -233,6 +233,7 @@ def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
     lines = [
         f"{comparison['n_matched']} of {comparison['n_reference']} reference times matched.",
         "Without offset: less a constant offset in the segment, as two definitions of a joint have.",
+        f"Joints tracked: {comparison['share_tracked']:.0%}; of these more than 100 mm off: {comparison['n_far']}.",
     ]
     return _Comparison(title, table, lines)
 

@@ -9,7 +9,7 @@ Independent of cameras, images and truth.
 from airborne.motion.angles import root_angles
 from airborne.motion.files import MotionWriter, drop_rows, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.flight.momentum_table import FlightSummary, flight_summary, has_inertias, measure_flight
-from airborne.motion.joints import JointStatus, joint_angles, joint_statuses, landmarks
+from airborne.motion.joints import JointStatus, joint_angles, joint_statuses, known_landmarks, landmarks
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import write_jumps
@@ -30,6 +30,7 @@ __all__ = [
     "has_inertias",
     "joint_angles",
     "joint_statuses",
+    "known_landmarks",
     "landmarks",
     "measure_flight",
     "measure_jumps",

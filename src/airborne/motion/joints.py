@@ -102,6 +102,14 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
     return status
 
 
+def known_landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array, NDArray[np.str_]]:
+    """Return `landmarks`, NaN where no image shows them, and `joint_statuses`. Raises ResultError for another body."""
+    points, sd = landmarks(motion, model)
+    status = joint_statuses(motion, model, sd)
+    is_guess = status == JointStatus.UNKNOWN.value
+    return np.where(is_guess[..., None], np.nan, points), np.where(is_guess, np.nan, sd), status
+
+
 def doubtful_segments(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     """Return which segments have a landmark, or an end, that is not tracked: (n, segments)."""
     status = joint_statuses(motion, model, landmarks(motion, model)[1])

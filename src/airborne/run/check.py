@@ -166,4 +166,5 @@ def _describe(trial: Trial) -> str:
 
 def _describe_video(facts: VideoFacts) -> str:
     width, height = facts.size
-    return f"{width}×{height} px, {float(facts.image_rate):.5g} images/s, {facts.fields}"
+    cut = f"; cut off before its last {count(facts.n_cut, 'image')}, copy it again" if facts.n_cut else ""
+    return f"{width}×{height} px, {float(facts.image_rate):.5g} images/s, {facts.fields}{cut}"

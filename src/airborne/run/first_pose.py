@@ -20,7 +20,7 @@ from airborne.tracking.model_based.degrees_of_freedom import FIRST_POSE_SD
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 
-OUT_OF_SIGHT = "the start pose lies in no camera's image; check start.position_m, in metres"
+OUT_OF_SIGHT = "the start pose lies in no camera's image; check [start], in metres, and the calibration"
 
 
 def find_first_pose(trial: Trial, model: BodyModel, rig: Rig, detections: TrialDetections | None) -> FirstPose:

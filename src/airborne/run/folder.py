@@ -77,7 +77,7 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
-    recorded = _with_settings(_with_keys(read_record(record), identity), identity)
+    recorded = _recorded_identity(folder, identity)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
     is_corrected = table == MOTION and bool(changed) and set(changed) <= {"keys", "masks"}
     if changed and not is_corrected:
@@ -97,6 +97,17 @@ def prepare_folder(
         drop_rows(rows, lambda frame: any(before < frame < after for before, after in again))
         write_json(record, identity)
     return True
+
+
+def is_finished(folder: Path, identity: dict[str, Any]) -> bool:
+    """Say whether a folder holds a run of this identity that has its summary."""
+    is_whole = (folder / RUN_RECORD).is_file() and (folder / SUMMARY).is_file()
+    return is_whole and _recorded_identity(folder, identity) == identity
+
+
+def _recorded_identity(folder: Path, identity: dict[str, Any]) -> dict[str, Any]:
+    """Return the identity of the run in a folder, written as this one is."""
+    return _with_settings(_with_keys(read_record(folder / RUN_RECORD), identity), identity)
 
 
 def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from airborne import __version__
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.export.analysis_figures import write_residuals
-from airborne.motion import landmarks
+from airborne.motion import known_landmarks
 from airborne.motion.flight.phases import Event, body_events, player_events
 from airborne.motion.run_folder import (
     SMOOTH_JOINTS,
@@ -190,7 +190,7 @@ def _body_run(folder: Path) -> _Run:
             files = (MOTION, SMOOTH_JOINTS, ANGLES, EVENTS)
         return tables, files
 
-    points, _ = landmarks(motion, model)
+    points, *_ = known_landmarks(motion, model)
     return _Run(motion.time_s, points, ("",) * points.shape[1], lambda: {"": body_events(motion, model)}, write)
 
 

@@ -21,13 +21,21 @@ from airborne.export.summary import joint_warnings
 from airborne.io.figures import names_not_drawn
 from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion
-from airborne.motion.run_folder import CALIBRATION, SUMMARY
+from airborne.motion.run_folder import (
+    CALIBRATION,
+    REPORT,
+    SUMMARY,
+    holds_players,
+    read_body_run,
+    read_players_run,
+    read_summary,
+)
 from airborne.run.body import BodyRun
 from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
-from airborne.run.folder import list_tables, prepare_folder, recorded_take, run_identity
+from airborne.run.folder import is_finished, list_tables, prepare_folder, recorded_take, run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
@@ -47,6 +55,7 @@ class TrackResult:
 
     motion: Motion | PlayersMotion
     summary: dict[str, Any]
+    was_finished: bool = False  # resumed although nothing was left to do
 
 
 def track_trial(
@@ -65,7 +74,8 @@ def track_trial(
     """Track a trial, a body or players, and write the results into a folder.
 
     `resume` continues a run that was killed, to the same result; of players by tracking again from the start, their
-    rows stay. Where [[key]] tables have changed since, the frames between the keys beside them are tracked again.
+    rows stay. Where [[key]] tables have changed since, the frames between the keys beside them are tracked again. A run
+    that is finished stays as it is, unless pictures are still to be drawn.
     `live`, for players, reads pipes, capture devices, or files at their own speed, drops frames rather than fall
     behind, and ends with them or with KeyboardInterrupt. `pictures=False` leaves out videos, figures and report.
     `overwrite` replaces the run that the folder holds. `first_frame` tracks one frame and draws it, without a report.
@@ -133,6 +143,8 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
     folder, recording = options.folder, subject.recording
     identity = run_identity(subject.trial, live=options.live, take=options.take)
+    if options.resume and (finished := _finished_run(folder, identity, options.drawn)) is not None:
+        return finished
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
     write_pose2sim(folder / CALIBRATION, recording.rig)
     read_s = time.monotonic()
@@ -170,6 +182,15 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     if options.drawn == "videos":
         subject.write_report(folder, summary, motion)
     return TrackResult(motion, summary)
+
+
+def _finished_run(folder: Path, identity: dict[str, Any], drawn: OverlaysAs | None) -> TrackResult | None:
+    """Return the run that a folder holds; None where something is still to be tracked or drawn."""
+    if not is_finished(folder, identity) or (drawn is not None and not (folder / REPORT).is_file()):
+        return None
+    motion = read_players_run(folder) if holds_players(folder) else read_body_run(folder)[0]
+    summary = read_summary(folder)
+    return TrackResult(motion, summary, was_finished=True) if len(motion) == summary["n_frames"] else None
 
 
 def _of_stage(stage: str, report: StageProgress | None, otherwise: Progress | None) -> Progress | None:

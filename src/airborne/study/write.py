@@ -39,12 +39,12 @@ def write_comparison(
     Raises AirborneError where a variable is unknown or there are too few trials, conditions or events.
     """
     require_events(events)
-    check_spm1d()
     try:
         stems = [file_stem(variable) for variable in variables]
     except ValueError as error:
         raise AirborneError(f"--variable: {error}") from None
     study = read_study(batch, conditions)
+    check_spm1d()
     compared = [compare_trials(study, variable, events, real_time=real_time) for variable in variables]
     folder.mkdir(parents=True, exist_ok=True)
     _write_table(folder / MEANS, (row for each in compared for row in _means(each)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -70,6 +71,7 @@ class VideoFacts:
     flagged_order: FieldOrder  # by the stream's own flags
     fields: FieldOrder  # how it is read
     rotation_deg: int  # anticlockwise quarter turns that the file asks for
+    n_cut: int = 0  # images that the file's index names beyond its end
 
     @property
     def parities(self) -> tuple[int | None, ...]:
@@ -130,6 +132,7 @@ def facts_of(source: VideoSource, container: InputContainer, stream: VideoStream
         flagged_order=flagged,
         fields=fields,
         rotation_deg=frame.rotation % 360,
+        n_cut=_count_cut(Path(source.path), stream),
     )
 
 
@@ -214,6 +217,12 @@ def _packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Pack
         yield from container.demux(stream)
     except FFmpegError:
         yield av.Packet()
+
+
+def _count_cut(path: Path, stream: VideoStream) -> int:
+    """Count the images that a file's index names beyond its end, as where it was not copied whole; 0 for a pipe."""
+    size = path.stat().st_size if path.is_file() else math.inf
+    return sum(entry.pos + entry.size > size for entry in stream.index_entries)
 
 
 def _exact_rate(rate: Fraction) -> Fraction:

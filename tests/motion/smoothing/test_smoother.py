@@ -18,7 +18,7 @@ from airborne.motion.smoothing.smoother import (
     smooth_players,
     smooth_root,
 )
-from airborne.motion.smoothing.tables import write_smooth_joint_angles
+from airborne.motion.smoothing.tables import write_smooth_joint_angles, write_smooth_joints
 from tests.support.jumping import Jumper
 from tests.support.jumping import motion_of as jump_of
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
@@ -97,6 +97,21 @@ def test_lost_frames_stay_lost_and_filled_ones_say_so():
     assert filled["status"].to_numpy()[20] == "lost"
 
 
+def test_a_joint_that_no_image_shows_is_a_gap_and_each_row_says_how_it_was_tracked(tmp_path):
+    _, noisy = swing(lost=(40,))
+    covariance, shank = np.array(noisy.covariance), BODY.index_of(BODY.landmarks[-1].segment)
+    covariance[20:22, 3 + 3 * shank, 3 + 3 * shank] = np.inf  # it may turn as it likes
+    result = smooth_landmarks(replace(noisy, covariance=covariance), BODY, BUTTERWORTH, [])
+    last = result.sel(joint=BODY.landmarks[-1].name)
+    assert np.flatnonzero(np.isnan(last["position"].to_numpy()).any(axis=1)).tolist() == [20, 21, 40]
+    assert last["joint_status"].to_numpy()[[19, 20, 21, 40]].tolist() == ["tracked", "unknown", "unknown", "lost"]
+    com = result.sel(joint=CENTRE_OF_MASS)
+    assert com["joint_status"].to_numpy()[[20, 40]].tolist() == ["tracked", "lost"]
+    write_smooth_joints(tmp_path / "joints.csv", result)
+    rows = list(csv.DictReader((tmp_path / "joints.csv").read_text().splitlines()))
+    assert [row["status"] for row in rows] == result["joint_status"].to_numpy().ravel().tolist()
+
+
 def test_each_player_has_own_segments():
     jumper = Jumper()
     motion = jump_of(jumper)
@@ -105,6 +120,7 @@ def test_each_player_has_own_segments():
         players=("one", "two"),
         points=np.repeat(motion.points, 2, axis=1),
         covariance=np.repeat(motion.covariance, 2, axis=1),
+        joint_status=np.repeat(motion.joint_status, 2, axis=1),
     )
     result = smooth_players(motion, BUTTERWORTH, {"one": [jumper.takeoff_s, jumper.landing_s], "two": []})
     assert result["segment"].sel(player="one").max() == 2

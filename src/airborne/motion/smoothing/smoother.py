@@ -18,7 +18,7 @@ from airborne.errors import ResultError
 from airborne.geometry.rotations import angles_from_matrix, is_near_singular, matrix_from_angles, unwrap
 from airborne.motion.angles import ROOT_ANGLES
 from airborne.motion.flight.momentum_table import has_inertias, measure_flight
-from airborne.motion.joints import landmarks, require_body
+from airborne.motion.joints import known_landmarks, require_body
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion
 from airborne.motion.smoothing import (
@@ -115,16 +115,11 @@ def smooth_root(motion: Motion, model: BodyModel, smoothing: Smoothing, boundari
         history.append("in free flight the root turns with a constant angular momentum")
     space, radians = ("time", "space"), unwrap(angles_from_matrix(rotation.R), motion.time_s)
     quaternion = continuous_quaternions(rotation.R)
-    variables: dict = _position_variables(position, space)
+    variables: dict = _position_variables(position, space, motion.status)
     variables |= {"quaternion": (("time", "component"), quaternion, {"units": "1", "map": "world_from_root"})}
     variables |= _rotation_variables(rotation, space)
     variables |= {name: ("time", np.rad2deg(radians[:, k]), {"units": "deg"}) for k, name in enumerate(ROOT_ANGLES)}
-    variables |= {
-        "is_singular": ("time", is_near_singular(radians)),
-        "status": ("time", motion.status),
-        "segment": ("time", position.segment),
-        "is_filled": ("time", position.is_filled),
-    }
+    variables["is_singular"] = ("time", is_near_singular(radians))
     coordinates = _coordinates(motion.time_s, motion.index) | {"space": list("xyz"), "component": list("xyzw")}
     return xr.Dataset(variables, coordinates, {"history": history})
 
@@ -139,9 +134,11 @@ def smooth_landmarks(
 ) -> xr.Dataset:
     """Smooth the paths of a body's landmarks, and of its centre of mass where it has masses: (time, joint, space).
 
-    Each landmark has its own standard deviation, the same along all axes. Raises ResultError for another body's motion.
+    Each landmark has its own standard deviation, the same along all axes; where no image shows it is a gap.
+    `joint_status` (time, joint) is that of the tracked landmark, of the centre of mass the frame's. Raises ResultError
+    for another body's motion.
     """
-    points, sd = landmarks(motion, model)
+    points, sd, status = known_landmarks(motion, model)
     names = [landmark.name for landmark in model.landmarks]
     covariance = np.where(np.eye(3, dtype=bool), sd[..., None, None] ** 2, 0.0)
     if has_inertias(model):
@@ -150,10 +147,11 @@ def smooth_landmarks(
         points = np.concatenate([points, com[:, None]], axis=1)
         diagonal = np.where(np.eye(3, dtype=bool), com_sd[:, None, :] ** 2, 0.0)
         covariance, names = np.concatenate([covariance, diagonal[:, None]], axis=1), [*names, CENTRE_OF_MASS]
+        status = np.concatenate([status, motion.status[:, None]], axis=1)
     own = [boundaries_s] * len(names)
     segments = _smooth_points(motion.time_s, points, covariance, smoothing, boundaries_s=own, progress=progress)
     coordinates = _coordinates(motion.time_s, motion.index) | {"joint": names, "space": list("xyz")}
-    variables = _position_variables(segments, ("time", "joint", "space"))
+    variables = _position_variables(segments, ("time", "joint", "space"), status)
     return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
 
 
@@ -203,7 +201,7 @@ def smooth_players(
 ) -> xr.Dataset:
     """Smooth the joints of several players, each with its covariances and its player's segments.
 
-    Returns (time, player, joint, space), as `smooth_landmarks` does.
+    Returns (time, player, joint, space), and the tracked joints' statuses, as `smooth_landmarks` does.
     """
     n, n_players, n_joints = motion.points.shape[:3]
     own = [boundaries_s[name] for name in motion.players for _ in motion.joints]
@@ -220,7 +218,7 @@ def smooth_players(
         "joint": list(motion.joints),
         "space": list("xyz"),
     }
-    variables = _position_variables(segments, ("time", "player", "joint", "space"))
+    variables = _position_variables(segments, ("time", "player", "joint", "space"), motion.joint_status)
     return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})
 
 
@@ -256,15 +254,16 @@ def _require_covariances(smoothing: Smoothing, values: Array, covariance: Array)
         raise ResultError("the run states no covariances, which the Kalman smoother needs; use a spline or Butterworth")
 
 
-def _position_variables(segments: SmoothedSegments, axes: tuple[str, ...]) -> dict:
+def _position_variables(segments: SmoothedSegments, axes: tuple[str, ...], status: NDArray[np.str_]) -> dict:
+    """Name what was smoothed, axes (..., "space"), beside the status (...) of what was tracked."""
     units = {"value": ("position", "m"), "velocity": ("velocity", "m/s"), "acceleration": ("acceleration", "m/s2")}
     variables: dict = {}
     for field, (name, unit) in units.items():
         variables[name] = (axes, getattr(segments.paths, field), {"units": unit, "frame": "world"})
         variables[f"{name}_sd"] = (axes, getattr(segments.paths, f"{field}_sd"), {"units": unit, "frame": "world"})
-    if len(axes) > 2:
-        variables |= {"segment": (axes[:-1], segments.segment), "is_filled": (axes[:-1], segments.is_filled)}
-    return variables
+    flags = {"segment": segments.segment, "is_filled": segments.is_filled}
+    flags["joint_status" if "joint" in axes else "status"] = status
+    return variables | {name: (axes[:-1], values) for name, values in flags.items()}
 
 
 def _rotation_variables(rotations: SmoothedRotations, axes: tuple[str, str]) -> dict:

@@ -40,9 +40,9 @@ def write_smooth_motion(path: Path, table: xr.Dataset) -> None:
 def write_smooth_joints(path: Path, table: xr.Dataset) -> None:
     """Write the result of `smooth_landmarks` or `smooth_players`, one row per frame (and player) and joint.
 
-    Standard deviations are the root mean square over the axes.
+    Standard deviations are the root mean square over the axes; `status` is that of what was tracked.
     """
-    columns = _index_columns(table)
+    columns = _index_columns(table) | {"status": table["joint_status"].to_numpy().ravel()}
     for name, stem in _POSITION.items():
         columns |= {stem.format(axis): _component(table, name, axis) for axis in "xyz"}
     for name, column in _JOINT_SD.items():
