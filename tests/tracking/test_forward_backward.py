@@ -82,9 +82,12 @@ class TurnsRound(LosesAnArm):
     """A tracker that turns the body round on the way forward, which going back it does not undo."""
 
     from_frame: int = 6
+    in_doubt: tuple[int, ...] = ()  # further frames that are uncertain on the way forward
 
     def search(self, state, frames):
         found = super().search(state, frames)
+        if state > 0 and frames.index in self.in_doubt:
+            found = replace(found, status=Status.UNCERTAIN)
         is_round = state < 0 or frames.index >= self.from_frame
         elsewhere = TRUTH.move(np.zeros(3), np.array([0.0, 0.0, np.pi]))
         return replace(found, pose=elsewhere if is_round else TRUTH)
@@ -94,6 +97,14 @@ def test_where_the_way_back_does_not_end_at_the_known_start_no_frame_is_tracked(
     estimates = found_by(TurnsRound())
     assert [each.status for each in estimates] == [Status.TRACKED, *[Status.UNCERTAIN] * (N - 1)]
     assert {each.status for each in found_by(LosesAnArm())[1:]} == {Status.TRACKED}
+
+
+def test_after_a_stretch_that_is_lost_nothing_is_tracked_until_nothing_is_in_doubt(monkeypatch):
+    monkeypatch.setattr(both_directions, "_MOST_BYTES", 0)
+    monkeypatch.setattr(both_directions, "_FEWEST_HELD", 7)  # stretches are frames 1 to 7, 8 to 14 and 15 to 21
+    estimates = found_by(TurnsRound(in_doubt=(10,)), 22)
+    assert [each.status for each in estimates[1:15]] == [Status.UNCERTAIN] * 14
+    assert [each.status for each in estimates[15:]] == [Status.TRACKED] * 7
 
 
 @pytest.mark.parametrize("gone", [(N - 1,), (N - 2, N - 1), (0,), tuple(range(N)), (5, 6)])

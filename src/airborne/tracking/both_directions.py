@@ -83,6 +83,7 @@ def track_forward_backward(
 
     Stretches as long as memory holds are tracked forward and, where some frame or limb is in doubt, then back from the
     last pose that was found, and joined as between keys. The first frame, in which the body is known, is tracked once.
+    After a stretch in which the body was lost no frame is tracked until a stretch leaves nothing in doubt.
     """
     stretches = _Stretches(tracker, model, write, done or {}, tick, tracker.init())
     source = iter(frames)
@@ -123,6 +124,7 @@ class _Stretches:
     tick: Callable[[int], None]
     state: Any
     n_done: int = 0
+    is_lost: bool = False  # no frame of the last stretch that went both ways is tracked
 
     def track(
         self,
@@ -144,18 +146,22 @@ class _Stretches:
                 stretch=both_ways,
                 known=self.known,
                 only_if_doubtful=only_if_doubtful,
+                is_lost=self.is_lost,
                 report=lambda n_tracked: self.tick(self.n_done + n_tracked // 2),
             )
+        is_tracked = False
         for observed in reader.forward(start, stop):
             estimate = self.known.get(observed.index)
             if estimate is None:
                 estimate = ahead.get(observed.index) or self.tracker.search(self.state, observed)
                 self.write(estimate)
             self.n_done += 1
+            is_tracked |= estimate.status is Status.TRACKED
             if learned is None:
                 self.state = self.tracker.learn(self.state, observed, estimate)
             yield observed, estimate
         self.state = self.state if learned is None else learned
+        self.is_lost = both_ways is not None and not is_tracked
 
 
 def _track_both_ways(
@@ -167,10 +173,12 @@ def _track_both_ways(
     stretch: range,
     known: Mapping[int, Estimate],
     only_if_doubtful: bool,
+    is_lost: bool,
     report: Callable[[int], None],
 ) -> tuple[dict[int, Estimate], Any]:
     """Track a stretch both ways, from its last frame with a pose back; if that is known it stays as it is.
 
+    Where the body `is_lost` and some doubt goes on, both ways may follow the same wrong pose: no frame is tracked.
     Return the estimates, and what the tracker has learned by the end of a stretch that was tracked forward alone.
     """
     last, forward = stretch[-1], dict[int, Estimate]()
@@ -194,7 +202,7 @@ def _track_both_ways(
         state = tracker.learn(state, turned, back)
         report(len(forward) + len(passes))
     found = {**forward, **{estimate.index: estimate for estimate in join_passes(model, passes[::-1])}}
-    if only_if_doubtful and _ends_elsewhere(passes):
+    if only_if_doubtful and (is_lost or _ends_elsewhere(passes)):
         return {index: _doubt(each) for index, each in found.items()}, None
     return found, None
 
