@@ -4,7 +4,8 @@ The two somersaults of `../shared/data` (`--data FOLDER` for another place), tra
 and after the fit of the whole run, and the synthetic somersault with a smooth skin, frame by frame. Of each: the mean
 joint error, without each joint's constant offset (two definitions of a joint), the largest; joints that are called
 tracked and are more than 100 mm off; the reliability diagram, stated against found coverage, and its ECE, also by the
-deviations of single frames, without what lasts all run long. About 3 minutes. `--quick` tracks 12 frames of the
+deviations of single frames, without what lasts all run long. Of the fitted somersaults also the flight: centre of mass,
+gravity, angular momentum and turns. About 3 minutes. `--quick` tracks 12 frames of the
 synthetic one and writes no rows. The trackers see no truth.
 """
 
@@ -28,10 +29,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
+from airborne.body import BodyModel
 from airborne.body.chain import move_pose
 from airborne.evaluation import JointComparison, compare_joints, read_joint_paths
 from airborne.evaluation.joint_files import JointPaths
-from airborne.motion import Motion
+from airborne.motion import Motion, flight_summary, measure_flight, root_angles
 from airborne.motion.files import read_motion
 from airborne.motion.run_folder import TRACKED_MOTION, read_body_run
 from airborne.run.track import track_trial
@@ -47,16 +49,42 @@ N_QUICK = 12
 BY_FRAME = "refined, frame by frame"
 
 
-def compare_recording(folder: Path) -> Iterator[tuple[str, JointComparison]]:
-    """Track a recording, then fit the whole run to its images; yield each way's name and errors of joints."""
+def measure_recording(data: str, folder: Path) -> Iterator[list[dict]]:
+    """Track a recording, then fit the whole run to its images; yield the rows of either, and those of the flight."""
     trial, truth = read_trial(folder / "trial.toml"), read_joint_paths(folder / "truth_joints.csv")
     with tempfile.TemporaryDirectory() as results:
         run = Path(results) / "run"
         track_trial(trial, run, pictures=False)
         fitted, model = read_body_run(run)
         tracked = replace(read_motion(run / TRACKED_MOTION), lasting=fitted.lasting)
-        yield BY_FRAME, compare_joints(tracked, model, truth)
-        yield "refined", compare_joints(fitted, model, truth)
+        yield rows_of(data, BY_FRAME, compare_joints(tracked, model, truth))
+        yield rows_of(data, "refined", compare_joints(fitted, model, truth))
+        if (path := folder / "truth_flight.csv").is_file():
+            yield flight_rows(data, fitted, model, np.genfromtxt(path, delimiter=",", names=True))
+
+
+def flight_rows(data: str, motion: Motion, model: BodyModel, truth: np.ndarray) -> list[dict]:
+    """Return the rows of a flight whose truth has a row for each frame of the run."""
+    table, angles = measure_flight(motion, model), root_angles(motion)
+    summary = flight_summary(motion, table)
+    com = table["com"].to_numpy() - np.stack([truth[f"com_{axis}_m"] for axis in "xyz"], axis=-1)
+    momentum = table["angular_momentum"].to_numpy()
+    error = momentum - np.stack([truth[f"L_{axis}_kg_m2_s"] for axis in "xyz"], axis=-1)
+    sd = table["angular_momentum_sd"].to_numpy()
+    common = {"data": data, "method": "refined", "n": len(motion)}
+    rows = [
+        ("centre of mass, RMS without its mean", "mm", 1e3 * np.sqrt(np.mean((com - com.mean(axis=0)) ** 2) * 3), 10),
+        ("fitted gravity", "m/s2", summary.fitted_gravity_m_s2, 9.81),
+        ("its sd", "m/s2", summary.fitted_gravity_sd_m_s2, 0.1),
+        ("angular momentum, RMS about the worst axis", "kg m2/s", np.sqrt(np.nanmean(error**2, axis=0)).max(), 2),
+        ("its median sd", "kg m2/s", np.nanmedian(sd), 4),
+        ("its errors within 2 sd", "", np.mean(np.abs(error)[np.isfinite(sd)] < 2 * sd[np.isfinite(sd)]), "0.85..0.99"),
+    ]
+    for column, name, found in ((0, "somersault", summary.somersault_rev), (2, "twist", summary.twist_rev)):
+        true = truth[f"{name}_deg"]
+        off, sd_deg = abs(found - (true[-1] - true[0]) / 360), np.hypot(*angles.sd_deg[[0, -1], column])
+        rows += [(f"{name}, off by", "turns", off, 0.02), (f"{name}, in sds", "", off / (sd_deg / 360), 2)]
+    return [{**common, "metric": m, "unit": u, "value": float(v), "floor": f} for m, u, v, f in rows]
 
 
 def compare_synthetic(n: int | None = None) -> JointComparison:
@@ -116,8 +144,8 @@ def main() -> None:
         if not (options.data / name).is_dir():
             print(f"{options.data / name} is not there: {name} is left out")
             continue
-        for method, found in compare_recording(options.data / name):
-            append("person_reliability", rows_of(name, method, found))
+        for rows in measure_recording(name, options.data / name):
+            append("person_reliability", rows)
 
 
 if __name__ == "__main__":

@@ -39,6 +39,11 @@ def momentum_of_particles(model, poses, step_s):
     return np.sum(mass[:, None] * np.cross(now - mass @ now / mass.sum(), velocity), axis=0)
 
 
+def sd_of_poses(motion):
+    """Deviations of the momentum by the poses alone."""
+    return np.sqrt(angular_momenta(motion, MODEL, inertia_sd=0)[1])
+
+
 def spun(model, momentum, duration_s, n):
     """Poses of a rigid body in free rotation with a momentum (3,), by Euler's equations."""
     tensor = model.segments[0].inertia.tensor_kg_m2
@@ -134,7 +139,7 @@ def test_momentum_deviations_are_those_of_sampled_poses():
     poses = swinging(MODEL, np.arange(8) / 50)
     runs = [[shaken(rng, pose, covariance) for pose in poses] for _ in range(n)]
     values = [angular_momenta(motion_of(MODEL, run), MODEL)[0] for run in runs]
-    stated = [angular_momenta(motion_of(MODEL, run, covariance=covariance), MODEL)[1] for run in runs[:20]]
+    stated = [sd_of_poses(motion_of(MODEL, run, covariance=covariance)) ** 2 for run in runs[:20]]
     sd = np.sqrt(np.mean(stated, axis=0))
     np.testing.assert_allclose(sd, np.std(values, axis=0), rtol=sampled(n))  # at the ends and inside
 
@@ -144,12 +149,13 @@ def test_errors_of_joints_that_stay_the_same_hardly_widen_the_momentum():
     joints_alone = np.where(np.arange(len(covariance)) < 6, 1e-6, 1.0)
     covariance = covariance * np.outer(joints_alone, joints_alone)
     off = [shaken(np.random.default_rng(4), pose, covariance) for pose in poses]  # all by the same
-    value, variance = angular_momenta(motion_of(MODEL, off, rate_hz=200, covariance=covariance), MODEL)
+    same = motion_of(MODEL, off, rate_hz=200, covariance=covariance)
+    (value, _), sd = angular_momenta(same, MODEL), sd_of_poses(same)
     exact, _ = angular_momenta(motion_of(MODEL, poses, rate_hz=200), MODEL)
     shaken_apart = [shaken(rng, pose, covariance) for rng in [np.random.default_rng(5)] for pose in poses]
-    _, apart = angular_momenta(motion_of(MODEL, shaken_apart, rate_hz=200, covariance=covariance), MODEL)
-    assert np.mean(np.abs(value - exact) < 2 * np.sqrt(variance)) > 0.85
-    assert np.median(np.sqrt(variance)) < 0.3 * np.median(np.sqrt(apart))
+    apart = sd_of_poses(motion_of(MODEL, shaken_apart, rate_hz=200, covariance=covariance))
+    assert np.mean(np.abs(value - exact) < 2 * sd) > 0.85
+    assert np.median(sd) < 0.3 * np.median(apart)
 
 
 def test_joint_that_two_frames_do_not_show_goes_on_as_smoothly_as_in_the_others():
@@ -158,9 +164,7 @@ def test_joint_that_two_frames_do_not_show_goes_on_as_smoothly_as_in_the_others(
     hidden = motion.covariance.copy()
     hidden[9:11, 6:9] = hidden[9:11, :, 6:9] = 0
     hidden[9:11, [6, 7, 8], [6, 7, 8]] = np.inf
-    shown_sd, hidden_sd = (
-        np.sqrt(angular_momenta(replace(motion, covariance=each), MODEL)[1]) for each in (motion.covariance, hidden)
-    )
+    shown_sd, hidden_sd = (sd_of_poses(replace(motion, covariance=each)) for each in (motion.covariance, hidden))
     beside = [7, 8, 11, 12]
     assert np.median(hidden_sd[beside]) < 3 * np.median(shown_sd[beside])
 
@@ -201,11 +205,39 @@ def test_unobserved_rotation_of_a_joint_widens_the_momentum_and_leaves_it_finite
     wide[6] = wide[:, 6] = 0
     wide[6, 6] = np.inf
     poses = swinging(MODEL, np.arange(5) / 50)
-    narrow_sd, wide_sd = (
-        np.sqrt(angular_momenta(motion_of(MODEL, poses, covariance=each), MODEL)[1]) for each in (covariance, wide)
-    )
+    narrow_sd, wide_sd = (sd_of_poses(motion_of(MODEL, poses, covariance=each)) for each in (covariance, wide))
     assert np.isfinite(wide_sd).all()
     assert (wide_sd > 10 * narrow_sd).any()
+
+
+def test_momentum_deviations_are_those_of_sampled_inertias():
+    trunk, *limbs = MODEL.segments
+    named = zip(limbs, ("arm_left", "arm_right", "hand", "leg"), strict=True)
+    limbs = [replace(segment, name=name, parent="trunk") for segment, name in named]
+    model = replace(MODEL, segments=(trunk, *limbs), landmarks=())
+    rng, n, sd = np.random.default_rng(6), 400, 0.1
+    motion = motion_of(model, swinging(model, np.arange(8) / 50), covariance=1e-16 * np.eye(model.n_dofs))
+
+    def sample():
+        kinds = 1 + sd * rng.standard_normal(4)[[0, 1, 1, 2, 3]]  # both arms are wrong alike
+        mass = [each.inertia.mass_kg for each in model.segments]
+        factors = kinds * np.sum(mass) / (kinds @ mass)  # the whole mass is known
+        inertias = [
+            Inertia(f * own.mass_kg, own.centre_m, f * own.tensor_kg_m2)
+            for f, own in zip(factors, (each.inertia for each in model.segments), strict=True)
+        ]
+        changed = [replace(each, inertia=own) for each, own in zip(model.segments, inertias, strict=True)]
+        return angular_momenta(motion, replace(model, segments=tuple(changed)))[0]
+
+    stated = np.sqrt(angular_momenta(motion, model, inertia_sd=sd)[1])
+    np.testing.assert_allclose(stated, np.std([sample() for _ in range(n)], axis=0), rtol=sampled(n) + sd)
+
+
+def test_a_rigid_bodys_momentum_is_as_sure_as_its_rotation():
+    model = plank()
+    motion = motion_of(model, spun(model, np.array([20.0, 5.0, 0.5]), 0.2, 11), covariance=1e-6 * np.eye(6))
+    values = [angular_momenta(motion, model, inertia_sd=sd)[1] for sd in (0.0, 0.5)]
+    np.testing.assert_array_equal(*values)
 
 
 def test_unknown_covariance_is_an_unknown_deviation():

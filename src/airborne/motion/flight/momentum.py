@@ -15,12 +15,16 @@ from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel, PosedBody
 from airborne.body.chain import point_jacobian
+from airborne.body.sides import without_side
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances
 from airborne.types import Array
 
 WINDOW = 5  # frames per fitted parabola: less noise than two, and no lag
+# sd of a segment's inertia, as a share: the standard error of moments of inertia of limbs that regressions on measured
+# lengths and girths give (Yeadon and Morlock 1989, Journal of Biomechanics 22, 683-689)
+INERTIA_SD = 0.13
 _UNOBSERVED_ROTATION_SD_RAD = 2 * np.pi / np.sqrt(12)  # standard deviation of an angle uniform over the circle
 _LARGEST_ROTATION_RAD = 2.0  # frames rotated further from the middle one are left out of a fit
 _STEP_RAD = 1e-5  # of the central difference
@@ -43,6 +47,11 @@ def angular_momentum(model: BodyModel, R: Array, rates: Array) -> Array:
     R (..., segments, 3, 3) is world from segment; rates (..., segments, 3) [rad/s] are angular velocities in each
     segment's own axes: of the root relative to the world, of the others relative to their parents.
     """
+    return np.sum(_segment_momenta(model, R, rates), axis=-2)
+
+
+def _segment_momenta(model: BodyModel, R: Array, rates: Array) -> Array:
+    """Return what each segment adds to `angular_momentum`: (..., segments, 3) [kg m^2/s]."""
     shape = np.broadcast_shapes(R.shape[:-3], rates.shape[:-2])
     omega = np.empty((*shape, len(model.segments), 3))
     position, velocity = np.zeros_like(omega), np.zeros_like(omega)  # of the origins, relative to the root's
@@ -57,20 +66,24 @@ def angular_momentum(model: BodyModel, R: Array, rates: Array) -> Array:
     mass = np.array([inertia.mass_kg for inertia in inertias])[:, None]
     arm = np.einsum("...sij,sj->...si", R, np.array([inertia.centre_m for inertia in inertias]))
     position, velocity = position + arm, velocity + np.cross(omega, arm)
-    position = position - np.sum(mass * position, axis=-2, keepdims=True) / mass.sum()
+    share = mass / mass.sum()
+    position, velocity = (each - np.sum(share * each, axis=-2, keepdims=True) for each in (position, velocity))
     tensor = np.array([inertia.tensor_kg_m2 for inertia in inertias])
     spin = np.einsum("...sij,sjk,...slk,...sl->...si", R, tensor, R, omega, optimize=True)
-    return np.sum(spin + mass * np.cross(position, velocity), axis=-2)
+    return spin + mass * np.cross(position, velocity)
 
 
-def angular_momenta(motion: Motion, model: BodyModel, window: int = WINDOW) -> tuple[Array, Array]:
+def angular_momenta(
+    motion: Motion, model: BodyModel, window: int = WINDOW, *, inertia_sd: float = INERTIA_SD
+) -> tuple[Array, Array]:
     """Return the angular momentum about the centre of mass (n, 3) [kg m^2/s], world axes, and its variances (n, 3).
 
     Angular velocities at a frame are the slopes, at its time, of parabolas through the rotations of the `window`
     nearest frames of the same unbroken stretch, shifted inward near its ends (two frames: a line; one: NaN). Lost
     frames, missing times and rotations over 2 rad end a fit. The variances are of first order in the poses of all
     frames of the fit. How much of each rotation's variance differs from frame to frame is told by its distances from
-    the parabolas; the rest of the error is the same in all frames of a fit.
+    the parabolas; the rest of the error is the same in all frames of a fit. Those of a body with joints include the
+    inertias', of an sd of this share.
     """
     rotations = np.concatenate([motion.R[:, None], matrix_from_angles(motion.joint_angles)], axis=1)
     fits = {
@@ -82,9 +95,11 @@ def angular_momenta(motion: Motion, model: BodyModel, window: int = WINDOW) -> t
     covariance = np.array([_rotation_covariance(*each) for each in zip(motion.covariance, motion.R, strict=True)])
     shares = _independent_shares(list(fits.values()), covariance)
     value, variance = np.full((2, len(motion), 3), np.nan)
+    by_inertia = inertia_sd * _inertia_kinds(model)
     for row, fit in fits.items():
         R = model.with_pose(motion.pose(row)).R
-        value[row] = angular_momentum(model, R, fit.value)
+        parts = _segment_momenta(model, R, fit.value)
+        value[row] = parts.sum(axis=0)
         if np.isnan(covariance[fit.rows]).all(axis=(1, 2)).any():
             continue  # a frame without any covariance
         gradients = dict(_gradients(model, R, fit, row))
@@ -93,7 +108,21 @@ def angular_momenta(motion: Motion, model: BodyModel, window: int = WINDOW) -> t
         )
         for other, gradient in gradients.items():
             variance[row] += propagate_variances(gradient * np.sqrt(shares[other]), covariance[other])
+        variance[row] += np.sum((by_inertia @ parts) ** 2, axis=0)
     return value, variance
+
+
+def _inertia_kinds(model: BodyModel) -> Array:
+    """Return which segments' inertias are wrong together, those of both sides: (kinds, segments), none if rigid.
+
+    By the factor 1 + x that all inertias of a kind change the momentum changes by x times what its row says of the
+    segments' momenta: the whole mass is known, so that the others' inertias fall as these rise.
+    """
+    stems = [without_side(segment.name) for segment in model.segments]
+    kinds = np.array([[stem == kind for stem in stems] for kind in dict.fromkeys(stems) if model.has_joints], float)
+    mass = np.array([0.0 if segment.inertia is None else segment.inertia.mass_kg for segment in model.segments])
+    kinds = kinds.reshape(-1, len(stems))
+    return kinds - (kinds @ mass / mass.sum())[:, None]
 
 
 def _rotation_covariance(covariance: Array, R: Array) -> Array:
