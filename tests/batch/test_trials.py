@@ -32,7 +32,9 @@ def test_a_folders_trials_are_its_trial_files_at_any_depth(tmp_path):
     write(tmp_path / "calib.toml", "[cam1]\nname = 'x'")
     write(tmp_path / "broken.toml", "name =\n[[camera]]")
     write(tmp_path / "body.toml", "name =")
-    assert names(tmp_path) == ["a", "b", "broken", "c"], "a file that cannot be read is not passed over"
+    write(tmp_path / "misspelt.toml", "name = 'x'\n[[cameras]]\nname = 'y'")
+    found = ["a", "b", "broken", "c", "misspelt"]
+    assert names(tmp_path) == found, "a file that cannot be read or has a mistake is not passed over"
     assert set(names(tmp_path / "?.toml")) == {"b", "c"}
 
 

@@ -55,7 +55,7 @@ def test_one_point_that_spoils_a_fit_of_least_squares_is_a_reason(tmp_path):
     ("output", "said"),
     [
         ("points.csv", "is what the cameras are calibrated from"),
-        ("notes.txt", "exists and is no calibration"),
+        ("notes.txt", "give a name that ends with .toml"),
         ("none/calib.toml", "there is no folder"),
     ],
 )
@@ -69,6 +69,27 @@ def test_no_other_file_is_written_over(tmp_path, monkeypatch, capsys, output, sa
     assert stopped.value.code == 2
     assert said in " ".join(capsys.readouterr().err.split())
     assert [(tmp_path / name).read_text() for name in ("points.csv", "notes.txt")] == ["mine"] * 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("points.csv", "--size", "640x480", "--fisheye"), "--fisheye goes with --board"),
+        (("points.csv", "--size", "640x480", "--timestamps", "points.csv"), "--timestamps goes with --board"),
+        (
+            ("points.csv", "--size", "640x480", "--court", "men", "--method", "annealing"),
+            "--method annealing goes with",
+        ),
+        (("sources.toml", "--method", "annealing"), "--method annealing goes with a table"),
+        (("points.csv", "--size", "640x480", "-o", "calib.yml"), "give a name that ends with .toml"),
+    ],
+)
+def test_options_that_would_be_ignored_are_refused(tmp_path, monkeypatch, capsys, words, said):
+    for name in ("points.csv", "sources.toml"):
+        (tmp_path / name).write_text("mine")
+    monkeypatch.chdir(tmp_path)
+    assert in_process("calibrate", *words, *(() if "-o" in words else ("-o", "calib.toml"))) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_video_that_is_given_twice_is_named(tmp_path, monkeypatch, capsys):
@@ -118,7 +139,7 @@ def test_what_our_reader_refuses_is_rejected(tmp_path):
     scaled = Rig(tuple(_far(camera, 1000.0) for camera in far))
     written, reasons = write_accepted(tmp_path / "calib.toml", scaled, Errors(ERRORS, GOOD))
     assert written.name == "calib.rejected.toml"
-    assert "cannot be read back" in reasons[0]
+    assert "m apart at most: give lengths in metres" in reasons[0]
 
 
 def _far(camera, scale):

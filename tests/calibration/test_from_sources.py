@@ -1,13 +1,15 @@
 """Calibration from recordings and tables, alone and together, end to end."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from airborne import cli
 from airborne.calibration import calibrate_from, sources_from
-from airborne.calibration.report import calibration_to_dict
+from airborne.calibration.bundle.lenses import CAMERA_PARAMETERS
+from airborne.calibration.report import calibration_to_dict, describe_calibration
 from airborne.cameras import Rig, read_rig, write_pose2sim
 from airborne.errors import AirborneError
 from tests.support.calibration_scenes import (
@@ -45,6 +47,15 @@ def recordings(tmp_path_factory):
 
 def videos(**extra):
     return [{"name": name, "video": f"{name}.mp4", **extra} for name in RIG.names]
+
+
+def test_a_place_that_no_source_shows_is_open(by_board):
+    assert "open" not in describe_calibration(by_board)
+    sd = np.array(by_board.adjustment.camera_sd)
+    sd[1, CAMERA_PARAMETERS.index("x_m")] = 100.0
+    said = describe_calibration(replace(by_board, adjustment=replace(by_board.adjustment, camera_sd=sd)))
+    assert f"warning: no source shows where {RIG.names[1]} stand" in said
+    assert "open" in next(line for line in said.splitlines() if line.startswith(RIG.names[1]))
 
 
 @pytest.fixture(scope="module")

@@ -129,7 +129,7 @@ def test_going_on_with_another_result_is_refused_and_leaves_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (b"score,n_views", b"score", "begins with"),
+        (b"score,n_views", b"score", "has no column n_views"),
         (b"\nAnna,0,0.0,tracked,hip_left", b"\nAnna,0,0.0,tracked,knee_left", "the rows of some frame"),
         (b"\nAnna,3,", b"\nAnna,12,", "the rows of some frame"),
         (b"\nAnna,3,", b"\nAnna,three,", "three"),

@@ -47,9 +47,33 @@ def test_paths_of_joints_are_compared_and_kept_in_the_summary(run):
     assert remaining["name"] == "run"
 
 
+def test_with_a_folder_of_its_own_a_comparison_leaves_the_run_as_it_is(run):
+    before = contents_of(run)
+    out = run.parent / "out"
+    assert in_process("evaluate", run, "--joints", run.parent / "higher.csv", "-o", out) == 0
+    assert contents_of(run) == before
+    assert "agreement_methods.txt" in files_of(out)
+
+
 def test_nothing_to_compare_with_is_refused(run):
     with pytest.raises(ResultError, match=r"give a truth\.csv"):
         assess(run, None, None)
+
+
+def test_a_table_that_was_cut_is_refused(run):
+    summary = (run / "summary.json").read_text()
+    (run / "summary.json").write_text(summary.replace('"n_frames": 1', '"n_frames": 5'))
+    with pytest.raises(ResultError, match=r"motion\.csv holds 3 of 5 frames: it was cut"):
+        assess(run, None, None, run.parent / "higher.csv")
+
+
+def test_a_truth_of_players_in_millimetres_is_asked_about(tmp_path, capsys):
+    run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv")
+    lines = [line.split(",") for line in truth.read_text().splitlines()]
+    scaled = [line if k == 0 else line[:3] + [str(1e3 * float(x)) for x in line[3:]] for k, line in enumerate(lines)]
+    truth.write_text("\n".join(map(",".join, scaled)) + "\n")
+    assert in_process("evaluate", run, truth) == 0
+    assert "is it in millimetres? Tables hold metres" in capsys.readouterr().out
 
 
 def test_a_truth_given_as_joints_is_refused_in_one_line(run, thrown_cross):

@@ -199,7 +199,7 @@ def test_every_format_has_its_option(players_run, tmp_path, monkeypatch):
     ("files", "said"),
     [
         ({}, "holds no run"),
-        ({"joints.csv": "frame,time_s,joint\n"}, "begins with 'frame,time_s,joint'"),
+        ({"joints.csv": "frame,time_s,joint\n"}, "has no column player, status, x_m"),
         ({"motion.csv": "a,b\n1,2\n"}, "has no column frame"),
         ({"motion.csv": b"\xff\xfe\x00"}, "motion.csv"),
         ({"joints.csv": b""}, "is empty"),

@@ -242,6 +242,13 @@ def _send(folder, name):
         pipe.write((folder / f"{name}.mkv").read_bytes())
 
 
+def test_of_images_that_come_too_rarely_no_joint_is_tracked(path, tmp_path):
+    run = track_trial(read_trial(path, {"every": 3}), tmp_path / "run", pictures=False)
+    assert run.motion.rate < 29
+    assert set(run.motion.joint_status.ravel().tolist()) == {"uncertain"}
+    assert any("no joint is called tracked and no jump is measured" in each for each in run.summary["warnings"])
+
+
 def test_live_runs_cannot_be_resumed_and_bodies_cannot_be_live(path, tmp_path, thrown_cross, capsys):
     with pytest.raises(AirborneError, match="cannot be resumed"):
         track_trial(read_trial(path), tmp_path / "run", live=True, resume=True)

@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from airborne.trial.file import read_tables
 TABLE = "trials.csv"
 _OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
-_MEANT_AS_TRIAL = re.compile(r"^[ \t]*(\[\[camera\]\]|session[ \t]*=)", re.MULTILINE)
+_MEANT_AS_TRIAL = re.compile(r"^[ \t]*(\[\[camera|session[ \t]*=)", re.MULTILINE)
+_ALIKE = 0.8  # of words, as difflib measures it: cameras, camara
 _HEAD_BYTES = 100_000  # of a file that is no TOML, in which words of a trial are looked for
 _TABLE_FORM = "a table of trials has a line of names, one of them trial, then a line for each trial"
 
@@ -68,7 +70,8 @@ def _is_trial(path: Path) -> bool:
         return False
     except tomllib.TOMLDecodeError:
         return path.name == _ALWAYS_TRIAL or _MEANT_AS_TRIAL.search(_read_head(path)) is not None
-    return path.name == _ALWAYS_TRIAL or "session" in tables or {"name", "camera"} <= tables.keys()
+    has_cameras = get_close_matches("camera", tables, cutoff=_ALIKE)
+    return path.name == _ALWAYS_TRIAL or "session" in tables or bool("name" in tables and has_cameras)
 
 
 def _read_head(path: Path) -> str:

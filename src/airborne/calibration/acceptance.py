@@ -10,6 +10,7 @@ import numpy as np
 
 from airborne.calibration.from_points import Calibration
 from airborne.cameras import Rig, read_rig, write_pose2sim
+from airborne.cameras.units import check_baselines
 from airborne.errors import CalibrationError
 from airborne.types import Array
 
@@ -49,8 +50,12 @@ def write_accepted(path: Path, rig: Rig, missed: Errors) -> tuple[Path, tuple[st
     rejected = path.with_name(f"{path.stem}.rejected{path.suffix}")
     reasons = list(_reasons(rig, missed))
     write_pose2sim(rejected, rig, errors_px=missed.rms_px)
+    reasons += [
+        f"{finding.what}: give lengths in metres, and check that names and clicks belong together"
+        for finding in check_baselines(rig)
+    ]
     try:
-        read_rig(rejected)
+        read_rig(rejected, unit="m")  # its distances are judged already
     except CalibrationError as error:
         reasons.append(f"the file cannot be read back: {error}")
     return (rejected, tuple(reasons)) if reasons else (rejected.replace(path), ())

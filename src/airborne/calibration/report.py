@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from airborne.cameras import Camera
 from airborne.types import Array
 
 _LEFT_OUT_WEIGHT = 0.1  # observations of a smaller weight count as left out
+_OPEN_SD_M = 1.0  # of a camera's place: no source shows where it is
 
 
 def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
@@ -21,10 +23,7 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
     adjusted = calibration.adjustment
     cameras = {}
     for i, camera in enumerate(calibration.rig):
-        names = FISHEYE_PARAMETERS if camera.lens == "fisheye" else CAMERA_PARAMETERS
-        sd = {
-            name: float(value) for name, value in zip(names, adjusted.camera_sd[i], strict=True) if name and value > 0
-        }
+        sd = _sds(calibration, i)
         fit = calibration.inputs.lenses.get(camera.name)
         cameras[camera.name] = {
             "size_px": list(camera.size),
@@ -62,6 +61,13 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
     }
 
 
+def _sds(calibration: RigCalibration, i: int) -> dict[str, float]:
+    """Return the standard deviations of what was adjusted of a camera, by name."""
+    names = FISHEYE_PARAMETERS if tuple(calibration.rig)[i].lens == "fisheye" else CAMERA_PARAMETERS
+    values = calibration.adjustment.camera_sd[i]
+    return {name: float(value) for name, value in zip(names, values, strict=True) if name and value > 0}
+
+
 def _change_from_start(calibration: RigCalibration, camera: Camera) -> dict[str, float]:
     """Return how far a camera moved from the initial calibration."""
     if calibration.inputs.start_rig is None:
@@ -80,7 +86,8 @@ def describe_calibration(calibration: RigCalibration) -> str:
     header = ("camera", "seen", "RMS px", "held-out px", "focal px", "sd", "place sd mm", "model")
     rows: list[tuple[str, ...]] = [header]
     for name, camera in report["cameras"].items():
-        position_sd = [camera["sd"].get(key, 0.0) for key in ("x_m", "y_m", "z_m")]
+        place_sd_m = _place_sd_m(camera["sd"])
+        place = "held" if not place_sd_m else "open" if place_sd_m > _OPEN_SD_M else f"{1e3 * place_sd_m:.1f}"
         rows.append(
             (
                 name,
@@ -89,7 +96,7 @@ def describe_calibration(calibration: RigCalibration) -> str:
                 _format(camera["held_out_rms_px"]),
                 f"{camera['focal_px'][0]:.1f}",
                 f"{camera['sd']['fx_px']:.1f}" if "fx_px" in camera["sd"] else "held",
-                f"{1e3 * math.hypot(*position_sd):.1f}" if any(position_sd) else "held",
+                place,
                 camera["lens_model"] or "",
             )
         )
@@ -112,6 +119,11 @@ def describe_calibration(calibration: RigCalibration) -> str:
     return "\n".join([*lines, *(f"warning: {text}" for text in report["warnings"])])
 
 
+def _place_sd_m(sd: Mapping[str, float]) -> float:
+    """Return the standard deviation of a camera's place, over all axes [m]; 0 where it is held."""
+    return math.hypot(*(sd.get(key, 0.0) for key in ("x_m", "y_m", "z_m")))
+
+
 def residual_distances_px(calibration: RigCalibration) -> list[Array]:
     """Return by source the distances of observations from their projections [px]."""
     return [np.linalg.norm(residual, axis=1) for residual in calibration.adjustment.residual_px]
@@ -128,6 +140,12 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
             sentences.append(
                 f"{share:.0%} of source '{source.name}' fit nothing: it contradicts the others, or is of other cameras"
             )
+    places = [name for i, name in enumerate(calibration.rig.names) if _place_sd_m(_sds(calibration, i)) > _OPEN_SD_M]
+    if places:
+        sentences.append(
+            f"no source shows where {', '.join(places)} stand: their places are those of [start], which were found "
+            "with other lenses; add control points, a wand, a court or a board that several cameras see"
+        )
     return tuple(sentences)
 
 

@@ -24,7 +24,7 @@ def check_baselines(rig: Rig) -> list[Finding]:
     return [
         Finding(
             kind="units",
-            what=f"the cameras come out {longest_m:.3g} m apart at most",
+            what=f"the cameras come out {longest_m:{'.3g' if longest_m < 1 else '.0f'}} m apart at most",
             advice="a length is not in metres: check square_m, the wand's length and the coordinates (mm / 1000 = m)",
         )
     ]

@@ -62,12 +62,18 @@ def calibrate_command(
             raise AirborneError(f"{path} does not exist; check the path")
         if path is not None and output.exists() and output.samefile(path):
             raise AirborneError(f"-o {output} is what the cameras are calibrated from; give the result another name")
-    if output.exists() and output.suffix.lower() != ".toml":
-        raise AirborneError(f"-o {output} exists and is no calibration (.toml); give the result another name")
+    if output.suffix.lower() != ".toml":
+        raise AirborneError(f"-o {output}: give a name that ends with .toml; `airborne convert` writes other formats")
     if not output.parent.is_dir():
         raise AirborneError(f"-o {missing_folder(output)}")
+    for option, is_given in (("--fisheye", fisheye), ("--timestamps", timestamps is not None)):
+        if is_given and board is None:
+            raise AirborneError(f"{option} goes with --board; a file of sources says both for each camera or board")
     if board is None and files[0].is_dir():
         raise AirborneError(f"{files[0]} is a folder; give a table or a file of sources, or --board for its images")
+    is_table = board is None and len(files) == 1 and files[0].suffix.lower() in _TABLES
+    if method != "lm" and (court is not None or wand is not None or not is_table):
+        raise AirborneError(f"--method {method} goes with a table of control points")
     if court is not None or wand is not None:
         is_filmed = court is None and (len(files) > 1 or files[0].suffix.lower() not in _TABLES)
         sources = _wand_sources(files, wand, size) if is_filmed else _table_sources(files, court, wand, size)

@@ -8,12 +8,14 @@ from typing import Annotated
 
 import typer
 
-from airborne.cli.console import Json, Out, progress
+from airborne.cli.console import Json, progress
 
 
 def find_command(
     trial: Annotated[Path, typer.Argument(help="The trial's TOML file; it needs no [start].")],
-    output: Out = Path("airborne-find"),
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for candidates.json and its picture, if undecided.")
+    ] = Path("airborne-find"),
     take: Annotated[int | None, typer.Option(min=1, help="Which of the poses in candidates.json.")] = None,
     as_json: Json = False,
 ) -> None:

@@ -43,7 +43,7 @@ def evaluate_command(
         list[Path] | None, typer.Option(help="Another person's clicks beside --digitised; may be repeated.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the agreement's files; else the run's.")
+        Path | None, typer.Option("-o", "--output", help="Folder for the agreement's files; the run stays as it is.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -57,7 +57,8 @@ def evaluate_command(
     from airborne.run.evaluate import assess, evaluate_agreement
 
     others = repeat or joint_angles
-    comparisons = {} if others and not (truth or digitised or joints) else assess(results, truth, digitised, joints)
+    is_others_alone = others and not (truth or digitised or joints)
+    comparisons = {} if is_others_alone else assess(results, truth, digitised, joints, keep=output is None)
     agreement = evaluate_agreement(
         results,
         truth,

@@ -126,10 +126,10 @@ class MotionComparison:
         return "\n".join(lines)
 
 
-def question_units(rms_mm: float) -> list[str]:
+def question_units(distance_mm: float) -> list[str]:
     """Ask in one line whether a reference so far away is in millimetres; nothing where it is near."""
-    far = f"the reference lies {rms_mm / 1e3:.0f} m from the run; is it in millimetres? Tables hold metres"
-    return [far] if rms_mm > _FAR_MM else []
+    far = f"the reference lies {distance_mm / 1e3:.0f} m from the run; is it in millimetres? Tables hold metres"
+    return [far] if distance_mm > _FAR_MM else []
 
 
 def _rows(names: Sequence[str], rms: Sequence[float], largest: Sequence[float]) -> list[tuple[str, str, str]]:

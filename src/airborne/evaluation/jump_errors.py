@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from airborne.evaluation.compare import or_dash
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.players import PlayersMotion
@@ -46,11 +47,11 @@ class JumpErrors:
 
     def _line(self, heights: dict[str, float], events: dict[str, float]) -> str:
         parts = [
-            f"{title} {100 * heights[name]:+.1f} cm"
+            f"{title} {or_dash(100 * heights[name], '+.1f')} cm"
             for name, title in zip(HEIGHTS, _TITLES, strict=True)
             if name in heights
         ]
-        parts += [f"{name.removesuffix('_frame')} {error:+.2f} frames" for name, error in events.items()]
+        parts += [f"{name.removesuffix('_frame')} {or_dash(error, '+.2f')} frames" for name, error in events.items()]
         return ", ".join(parts)
 
 

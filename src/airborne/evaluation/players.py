@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError
-from airborne.evaluation.compare import match_times, nan_to_none, or_dash, span
+from airborne.evaluation.compare import match_times, nan_to_none, or_dash, question_units, span
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
 from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
 from airborne.evaluation.success import Cover, success_cover
@@ -85,6 +85,7 @@ class PlayersComparison:
         ]
         for name, errors in self.players.items():
             lines += _error_lines(name, errors)
+        lines += question_units(max((each.parts["all"].median_mm for each in self.players.values()), default=math.nan))
         lines += [jump.describe() for jump in self.jumps]
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")

@@ -243,9 +243,11 @@ def _table(path: Path, n_bytes: int) -> pd.DataFrame:
         data = file.read(n_bytes)
     header = data[: data.find(b"\n")].decode(errors="replace").strip()
     if header != ",".join(PLAYERS_COLUMNS):
-        raise ResultError(
-            f"{path} begins with '{header[:60]}'; {_EXPECTED}, which begins with '{PLAYERS_COLUMNS[0]},...'"
+        lacking = [name for name in PLAYERS_COLUMNS if name not in header.split(",")]
+        problem = (
+            f"has no column {', '.join(lacking[:3])}" if lacking else "has columns of other names or another order"
         )
+        raise ResultError(f"{path} {problem}; {_EXPECTED}; track again")
     unknown = {name: [""] for name in PLAYERS_COLUMNS if name not in _TEXTS}
     try:
         with np.errstate(invalid="ignore"):

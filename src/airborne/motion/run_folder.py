@@ -72,12 +72,13 @@ def note_if_unfinished(folder: Path) -> str | None:
 def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
     """Return the motion and the body of the run in a folder, finished or not.
 
-    Raises ResultError if the folder holds none, the body is missing, or its record is damaged.
+    Raises ResultError if the folder holds none, the body is missing, its record is damaged, or its table was cut.
     """
     if not (folder / MOTION).is_file():
         raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
     check_record(folder)
     motion = read_motion(folder / MOTION)
+    _refuse_cut_table(folder, MOTION, len(motion))
     if not (folder / BODY).is_file():
         raise ResultError(
             f"{folder / 'body.toml'} is missing, the body that was tracked; put the trial's body file there, "
@@ -89,7 +90,16 @@ def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
 def read_players_run(folder: Path) -> PlayersMotion:
     """Return the motion of the run of players in a folder. Raises ResultError as `read_body_run` does."""
     check_record(folder)
-    return read_players(folder / JOINTS)
+    motion = read_players(folder / JOINTS)
+    _refuse_cut_table(folder, JOINTS, len(motion))
+    return motion
+
+
+def _refuse_cut_table(folder: Path, table: str, n: int) -> None:
+    """Raise ResultError where a table has fewer frames than the run's summary, if it is finished, counts."""
+    n_whole = read_summary(folder)["n_frames"] if (folder / SUMMARY).is_file() else n
+    if isinstance(n_whole, int) and n < n_whole:
+        raise ResultError(f"{folder / table} holds {n} of {n_whole} frames: it was cut; copy the folder or track again")
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

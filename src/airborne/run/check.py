@@ -86,6 +86,11 @@ def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
         )
         if facts is not None:
             found[camera.name] = facts
+            if facts.n_cut:
+                checks.mistakes.append(
+                    f"camera '{camera.name}': {camera.video} is cut off before its last {count(facts.n_cut, 'image')}; "
+                    "copy it again"
+                )
     return found
 
 
@@ -120,6 +125,9 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
     if recording.n_frames == 0:
         checks.mistakes.append(str(past_the_end_error(trial, recording)))
         return
+    for mask in trial.mask:
+        if recording.n_images is not None and mask.first >= recording.n_images:
+            checks.add(f"note: [[mask]] of {mask.camera} begins at frame {mask.first}, after the recording's end")
     if trial.key and not trial.has_players:
         checks.attempt(
             lambda: keys_of_frames(trial, trial.model(), recording),
@@ -166,5 +174,4 @@ def _describe(trial: Trial) -> str:
 
 def _describe_video(facts: VideoFacts) -> str:
     width, height = facts.size
-    cut = f"; cut off before its last {count(facts.n_cut, 'image')}, copy it again" if facts.n_cut else ""
-    return f"{width}×{height} px, {float(facts.image_rate):.5g} images/s, {facts.fields}{cut}"
+    return f"{width}×{height} px, {float(facts.image_rate):.5g} images/s, {facts.fields}"

@@ -55,14 +55,16 @@ _METHODS = "agreement_methods.txt"
 _LARGEST_METHODS_BYTES = 1_000_000  # a hundred comparisons; anything larger was not written here
 
 
-def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None) -> Comparisons:
-    """Compare the run in a folder, and put the comparison into its summary; of one body into figures and report too.
+def assess(
+    folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None, *, keep: bool = True
+) -> Comparisons:
+    """Compare the run in a folder; `keep` puts it into the run's summary, of one body into figures and report too.
 
     `joints` are paths of joints as `read_joint_paths` reads them, with which smoothed joints in the folder are compared
     too. Raises ResultError where the folder holds no finished run or a file cannot be read.
     """
     if holds_players(folder):
-        return _assess_players(folder, truth, is_alone=digitised is None and joints is None)
+        return _assess_players(folder, truth, is_alone=digitised is None and joints is None, keep=keep)
     if truth is None and digitised is None and joints is None:
         raise ResultError(
             "nothing to compare with; give a truth.csv, --digitised, --joints, --joint-angles, or --repeat with a run"
@@ -83,6 +85,8 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
         comparisons["joints"] = compare_joints(motion, model, paths)
         if smooth.is_file():
             comparisons["smooth_joints"] = compare_joints(motion, model, paths, read_joint_paths(smooth))
+    if not keep:
+        return comparisons
     with open_results(folder):
         summary = _add_to_summary(folder, comparisons)
         if summary and (folder / run_folder.REPORT).is_file():
@@ -97,7 +101,7 @@ def assess(folder: Path, truth: Path | None, digitised: Path | None, joints: Pat
     return comparisons
 
 
-def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Comparisons:
+def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool, keep: bool) -> Comparisons:
     if truth is None or not is_alone:
         raise ResultError(
             f"{folder} holds a run of players, which is compared with a truth of players only; "
@@ -105,8 +109,9 @@ def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool) -> Comp
         )
     check_record(folder)
     comparisons = {"truth": assess_players(folder, truth)}
-    with open_results(folder):
-        _add_to_summary(folder, comparisons)
+    if keep:
+        with open_results(folder):
+            _add_to_summary(folder, comparisons)
     return comparisons
 
 

@@ -14,7 +14,7 @@ from airborne.calibration.from_points import Calibration
 from airborne.export.overlays import OverlaysAs
 from airborne.export.players_overlay import PlayersOverlayVideos
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
-from airborne.motion.jumps.heights import measure_jumps
+from airborne.motion.jumps.heights import LEAST_RATE_HZ, measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
@@ -30,6 +30,10 @@ from airborne.video import Frames, LiveRecording, Recording
 _UNCERTAINTY = (
     "Standard deviations include what the method itself leaves uncertain, joint by joint. They do not include joints "
     "that were set wrongly at the start, or errors of the cameras' calibration or times."
+)
+_SLOW = (
+    "images come {rate:.4g} times a second: legs move so far between them that they can be lost, so no joint is called "
+    "tracked and no jump is measured; track {least:g} images a second or more"
 )
 _OVERCONFIDENT = (
     "the standard deviations are only the spread of the particles of {method} and far too small: in trials with a "
@@ -86,7 +90,7 @@ class PlayersRun:
         tick: Callable[[int], None],
     ) -> Iterator[tuple[Frames, PlayersStep]]:
         """Yield each time's frames with the players' step there, written."""
-        return track_frames(StepTracker(self.players), frames, write, done)
+        return track_frames(StepTracker(self.players, self._is_slow), frames, write, done)
 
     def writer(self, folder: Path, *, resume: bool) -> PlayersWriter:
         """Return what writes the estimates; rows that are there already stay."""
@@ -157,7 +161,12 @@ class PlayersRun:
     def warnings(self) -> list[str]:
         """Return what a reader of the numbers must know."""
         method = self.trial.track.method
-        return [] if method == "blocker" else [_OVERCONFIDENT.format(method=method)]
+        slow = [_SLOW.format(rate=float(self.recording.rate), least=LEAST_RATE_HZ)] if self._is_slow else []
+        return slow if method == "blocker" else [*slow, _OVERCONFIDENT.format(method=method)]
+
+    @property
+    def _is_slow(self) -> bool:
+        return self.recording.rate < LEAST_RATE_HZ
 
 
 def _player(motion: PlayersMotion, k: int, n_cameras: int) -> dict[str, Any]:

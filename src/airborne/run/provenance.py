@@ -11,16 +11,16 @@ from airborne.calibration.from_points import Calibration
 from airborne.trial.file import Trial
 from airborne.video import LiveRecording, Recording
 
-_EXACT_CALIBRATION = (
-    "the calibration comes from a file that does not say how good it is; the standard deviations of a body's pose take "
-    "what is usual, 0.1°, 10 mm and 0.5 % of the focal length"
-)
+_EXACT_CALIBRATION = "the calibration comes from a file that does not say how good it is; "
+_OF_A_BODY = "the standard deviations of poses take what is usual, 0.1°, 10 mm and 0.5 % of the focal length"
+_OF_PLAYERS = "the standard deviations of joints leave its errors out"
 
 
 def provenance_of(
     trial: Trial, recording: Recording | LiveRecording, calibration: Calibration | None, inputs: dict[str, str]
 ) -> dict[str, Any]:
     """Return the end of every summary: warnings, events, method, cameras, versions, inputs."""
+    exact = _EXACT_CALIBRATION + (_OF_PLAYERS if trial.has_players else _OF_A_BODY)
     fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
     cameras = [
         {
@@ -33,7 +33,7 @@ def provenance_of(
         for camera in recording.rig
     ]
     return {
-        "warnings": [_EXACT_CALIBRATION] if calibration is None else list(calibration.warnings),
+        "warnings": [exact] if calibration is None else list(calibration.warnings),
         "events": recording.events,
         "method": trial.track.model_dump(),
         "cameras": cameras,

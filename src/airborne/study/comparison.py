@@ -113,7 +113,11 @@ def _compare(
     present = {trial.condition for trial in trials}
     conditions = tuple(name for name in study.conditions if name in present)
     if len(conditions) < 2:
-        raise ResultError(f"{variable}: all trials have condition {', '.join(conditions)}; give two or more to compare")
+        without = f"; left out: {'; '.join(left_out)}"[:400] if left_out else ""
+        raise ResultError(
+            f"{variable}: all trials that have it are of condition {', '.join(conditions)}; give two or more to compare"
+            f"{without}"
+        )
     cells = Cells(
         values=values,
         variance=np.where(np.isfinite(variances), variances, 0.0),

@@ -57,7 +57,10 @@ def read_curve(trial: StudyTrial, variable: str) -> RunCurve:
         if mask.any() and column is not None:
             stated = table.get(sd.format(axis=named[2]), np.full(len(mask), ""))
             return _drop_unknown(trial, variable, table["time_s"][mask], column[mask], stated[mask])
-    raise ResultError(f"{trial.name}: its run has no {variable}; it has: {', '.join(list_curves(trial)[:40])}")
+    listed = list_curves(trial)
+    if variable in listed:  # of players, and none of them is this athlete
+        raise ResultError(f"{trial.name}: its run has no player '{trial.athlete}'; name players as their athletes")
+    raise ResultError(f"{trial.name}: its run has no {variable}; it has: {', '.join(listed[:40])}")
 
 
 def list_curves(trial: StudyTrial) -> list[str]:

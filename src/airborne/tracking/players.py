@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple, Protocol
 
@@ -61,6 +61,12 @@ def lost_player_estimate(player: str, frames: Frames, n_joints: int) -> PlayerEs
     )
 
 
+def _doubt(estimate: PlayerEstimate) -> PlayerEstimate:
+    """Return an estimate of which no joint is tracked."""
+    status = tuple(worst_status([each, Status.UNCERTAIN]) for each in estimate.joint_status)
+    return replace(estimate, joint_status=status)
+
+
 class PlayersTracker(Protocol):
     """Tracks all its players together. Everything random comes from a seed, so that a run can be repeated."""
 
@@ -90,6 +96,7 @@ class StepTracker:
     """A players' tracker, which searches and learns at once, as a `Tracker`."""
 
     tracker: PlayersTracker
+    is_slow: bool = False  # the images come so rarely that legs may be lost between them: no joint is tracked
 
     def init(self) -> Any:
         """Return the state before the first frame."""
@@ -97,7 +104,8 @@ class StepTracker:
 
     def search(self, state: Any, frames: Frames) -> PlayersStep:
         """Take the step."""
-        return PlayersStep(*self.tracker.step(state, frames))
+        step = PlayersStep(*self.tracker.step(state, frames))
+        return step._replace(players=tuple(map(_doubt, step.players))) if self.is_slow else step
 
     def learn(self, state: Any, frames: Frames, estimate: PlayersStep) -> Any:
         """Return the state after the step."""

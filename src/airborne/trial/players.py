@@ -11,10 +11,10 @@ from airborne.body.legs import LEG_POINTS, Legs
 from airborne.errors import BodyError
 from airborne.io.names import CheckedPath, ColumnName
 from airborne.tracking.players import PlayerStart
+from airborne.trial.pose_forms import FARTHEST_M
 from airborne.trial.table import ClickTable, SettingsTable, Vector
 
 _FEET = ("foot_left", "foot_right")
-_FARTHEST_M = 100.0  # no court is larger
 _MOST_UNDER_FLOOR_M = 0.3  # by how much a calibration's floor may be off
 
 
@@ -51,9 +51,9 @@ def start_of(name: str, joints_m: Mapping[str, Sequence[float]]) -> PlayerStart:
     """Return a player's start of joints in metres; raises ValueError for those that cannot be a player's."""
     check_point_names(name, joints_m)
     start = PlayerStart(name=name, joints_m={joint: np.array(point, float) for joint, point in joints_m.items()})
-    far = [joint for joint, point in start.joints_m.items() if np.abs(point).max() > _FARTHEST_M]
+    far = [joint for joint, point in start.joints_m.items() if np.abs(point).max() > FARTHEST_M]
     if far:
-        raise ValueError(f"player '{name}': {far[0]} lies over {_FARTHEST_M:g} m away; give metres")
+        raise ValueError(f"player '{name}': {far[0]} lies over {FARTHEST_M:g} m away; give metres")
     if start.has_legs:
         _check_legs(start)
     return start

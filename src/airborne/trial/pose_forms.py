@@ -16,6 +16,8 @@ BY_HAND = frozenset(
     {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
 )
 
+FARTHEST_M = 100.0  # of a coordinate: no court is larger
+
 
 class PoseForms(SettingsTable):
     """A body at a frame: a pose by hand, positions or clicked pixels of its landmarks, or detections of a network."""
@@ -52,6 +54,14 @@ class PoseForms(SettingsTable):
                 is_rotation = np.allclose(R @ R.T, np.eye(3), atol=1e-3) and np.linalg.det(R) > 0
             if not is_rotation:
                 raise ValueError("rotation_matrix is not a rotation: rows must be unit, at right angles, right-handed")
+        return self
+
+    @model_validator(mode="after")
+    def _check_places(self) -> PoseForms:
+        named = self.joints_m if isinstance(self.joints_m, dict) else {}
+        for name, place in {"position_m": self.position_m, **named}.items():
+            if place is not None and max(map(abs, place)) > FARTHEST_M:
+                raise ValueError(f"{name} lies over {FARTHEST_M:g} m away; give metres")
         return self
 
     @property

@@ -57,6 +57,11 @@ def test_peaks_over_standing_are_exact_without_noise(clean):
     assert clean.standing.ankles_m.value == pytest.approx(FLAT_M, abs=2e-3)
 
 
+def test_too_few_frames_a_second_measure_no_jump():
+    assert len(measure_jumps(motion_of(Jumper(rate=30.0)))) == 1
+    assert measure_jumps(replace(motion_of(Jumper(rate=20.0)), rate=20.0)) == ()
+
+
 def test_every_interval_holds_the_truth_without_noise(clean):
     for name, value in true_numbers(CLEAN).items():
         measured = getattr(clean, name)

@@ -12,7 +12,7 @@ from airborne.calibration.intrinsics.physical import fit_pinhole
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.dlt import FEWEST_DLT_POINTS, Decomposition, decompose, fit_dlt
 from airborne.cameras.finding import Finding
-from airborne.errors import CalibrationError
+from airborne.errors import CalibrationError, count
 from airborne.geometry.triangulation import px_from_points
 from airborne.types import Array
 
@@ -61,8 +61,9 @@ def _check_inside(points: ControlPoints, camera: str, size: tuple[int, int]) -> 
     if not outside.any():
         return
     first = int(np.flatnonzero(outside.any(axis=1))[0])
+    n = int(outside.any(axis=1).sum())
     what = (
-        f"camera '{camera}': {outside.any(axis=1).sum()} control points lie outside its {size[0]}×{size[1]} image "
+        f"camera '{camera}': {count(n, 'control point')} outside its {size[0]}×{size[1]} image "
         f"(first '{points.names[first]}' at u={px[first, 0]:g}, v={px[first, 1]:g})"
     )
     if not ((px < -0.5) | (px > upper[::-1])).any():
