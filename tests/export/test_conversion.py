@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airborne import cli
-from airborne.cameras import Rig, read_detections, read_rig, write_rig
+from airborne.cameras import Rig, read_detections, read_rig, write_pose2sim, write_rig
 from airborne.errors import AirborneError
 from airborne.export.conversion import FORMATS, ConversionOptions, convert
 from tests.support.cameras import LENS, three_cameras
@@ -53,6 +53,16 @@ def test_the_name_of_the_file_says_the_format_and_what_is_lost_is_reported(tmp_p
     ]
     _, output, _ = airborne("convert", tmp_path / "calib.toml", tmp_path / "d.csv", "--to-origin", "lower-left")
     assert f"written: {tmp_path / 'd.csv'}, dlt, lengths in m, pixels from the lower-left, the first is 1\n" in output
+
+
+def test_reprojection_errors_stay_or_are_said_to_be_lost(tmp_path, airborne):
+    rig, path = three_cameras(), tmp_path / "calib.toml"
+    write_pose2sim(path, rig, errors_px={name: 0.25 + 0.5 * k for k, name in enumerate(rig.names)})
+    assert "not in the new file" not in airborne("convert", path, tmp_path / "again.toml")[1]
+    errors = [line for line in path.read_text().splitlines() if line.startswith("error")]
+    assert [line for line in (tmp_path / "again.toml").read_text().splitlines() if line.startswith("error")] == errors
+    assert len(errors) == 4  # each camera's, and the whole rig's
+    assert "the cameras' reprojection errors" in airborne("convert", path, tmp_path / "calib.qca.txt")[1]
 
 
 def test_coefficients_from_below_need_their_origin(tmp_path, airborne):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,7 @@ _SUFFIXES = {
     **{".toml": "pose2sim", ".qca.txt": "qualisys", ".xcp": "vicon"},
     **{".yml": "opencv", ".yaml": "opencv", ".csv": "dlt"},
 }
+FORMATS_WITH_ERRORS = frozenset({"pose2sim", "caliscope"})
 FORMAT_UNITS: dict[str, tuple[Unit, ...]] = {
     **{"pose2sim": ("m",), "aniposelib": ("m", "mm"), "caliscope": ("m",), "qualisys": ("mm",)},
     **{"vicon": ("mm",), "opencv": ("m", "mm"), "easymocap": ("m", "mm"), "dlt": ("m", "mm")},
@@ -48,6 +50,7 @@ class CalibrationFile:
     format: str  # one of FORMAT_UNITS; pose2sim also for aniposelib, which has the same layout
     where: str
     build: Callable[[FileOptions], Rig]
+    errors_px: Mapping[str, float] = field(default_factory=dict)  # reprojection RMS by camera, where it says them
 
 
 def read_rig(
@@ -115,8 +118,17 @@ def open_calibration(path: str | Path) -> CalibrationFile:
         mend = f'; say control_points = "{path.name}"' if {"point", "x_m"} <= set(first.split(",")) else ""
         raise CalibrationError(f"{where} is no calibration ({content}); {_EXPECTED}{mend}") from None
     if isinstance(document.get("cameras"), dict):
-        return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where))
-    return CalibrationFile("pose2sim", where, partial(rig_from_tables, document, where))
+        named = {f"cam_{key}": table for key, table in document["cameras"].items()}
+        return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where), _errors_px(named))
+    tables = {key: table for key, table in document.items() if isinstance(table, dict)}
+    named = {str(table.get("name", key)): table for key, table in tables.items()}
+    return CalibrationFile("pose2sim", where, partial(rig_from_tables, document, where), _errors_px(named))
+
+
+def _errors_px(tables: Mapping[str, Any]) -> dict[str, float]:
+    """Return the errors that tables of cameras state, by name; 0 stands for unknown."""
+    errors = {name: table.get("error") for name, table in tables.items() if isinstance(table, dict)}
+    return {name: error for name, error in errors.items() if isinstance(error, float) and 0 < error < math.inf}
 
 
 def write_rig(

@@ -11,7 +11,15 @@ import numpy as np
 
 from airborne.cameras import Detections, Rig, read_detections, read_rig
 from airborne.cameras.detections import camera_names, write_detections
-from airborne.cameras.files import FORMAT_UNITS, CalibrationFile, build_rig, format_of_name, open_calibration, write_rig
+from airborne.cameras.files import (
+    FORMAT_UNITS,
+    FORMATS_WITH_ERRORS,
+    CalibrationFile,
+    build_rig,
+    format_of_name,
+    open_calibration,
+    write_rig,
+)
 from airborne.cameras.formats.dltdv import (
     Digitisation,
     is_xypts,
@@ -130,7 +138,12 @@ def _convert_rig(file: CalibrationFile, target: Path, options: ConversionOptions
         )
     _check_options(options, file.format, to)
     rig = build_rig(file, options.source)
-    lost = write_rig(target, rig, format=to, unit=options.target.unit, pixels=options.target.pixels)
+    errors_px = file.errors_px if file.errors_px.keys() >= set(rig.names) else None
+    lost = write_rig(
+        target, rig, format=to, unit=options.target.unit, pixels=options.target.pixels, errors_px=errors_px
+    )
+    if errors_px and to not in FORMATS_WITH_ERRORS:
+        lost = (*lost, "the cameras' reprojection errors")
     return Conversion(
         read=f"{file.where}, {file.format}, {count(len(rig), 'camera')}: {', '.join(rig.names)}",
         written=f"{target}, {to}{_convention(to, options.target)}",

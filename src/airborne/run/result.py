@@ -122,11 +122,12 @@ class Run:
     def plot(self, what: Literal["pose", "joints", "joint_status", "flight"] = "pose") -> Figure:
         """Draw curves over time with bands of two standard deviations, or the status of each joint.
 
-        Of a body its pose, or the angles of its joints, or its flight; of players the heights of hips, knees and
-        ankles.
+        Of a body its pose, or the angles of its joints, or its flight; of players, as "pose" or "joints", the heights
+        of hips, knees and ankles.
         """
         require_choice(what, ("pose", *_FIGURES), "figure")
         if self.has_players:
+            require_choice(what, ("pose", "joints"), "figure of players")
             return heights_figure(self.players)
         return pose_figure(self.motion) if what == "pose" else _FIGURES[what](self.motion, self.body)
 
