@@ -202,5 +202,5 @@ def _lag_notes(lags: Mapping[str, Array]) -> tuple[str, ...]:
     medians = ", ".join(f"{name} {np.median(lag_s) * 1e3:+.0f} ms" for name, lag_s in lags.items() if len(lag_s))
     return (
         "the cameras do not look at the same instant; each image of the moving board has its own time now "
-        f"(median against the others: {medians})",
+        f"(median against the others, + is later: {medians})",
     )

@@ -134,11 +134,12 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
     sentences = []
     if not calibration.adjustment.has_converged:
         sentences.append("the adjustment did not come to rest: look at the residuals, a source may contradict another")
-    for source, weights in zip(calibration.adjustment.sources, calibration.adjustment.weight, strict=True):
-        share = float(np.mean(weights < _LEFT_OUT_WEIGHT)) if len(weights) else 0.0
+    for i, source in enumerate(calibration.adjustment.sources):
+        share = _share_left_out(calibration, i)
         if share > 0.2:
             sentences.append(
-                f"{share:.0%} of source '{source.name}' fit nothing: it contradicts the others, or is of other cameras"
+                f"{share:.0%} of source '{source.name}' fit nothing: it contradicts others, is of other cameras, or "
+                "has points exchanged in some of them"
             )
     places = [name for i, name in enumerate(calibration.rig.names) if _place_sd_m(_sds(calibration, i)) > _OPEN_SD_M]
     if places:
@@ -147,6 +148,13 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
             "with other lenses; add control points, a wand, a court or a board that several cameras see"
         )
     return tuple(sentences)
+
+
+def _share_left_out(calibration: RigCalibration, i: int) -> float:
+    """Return the share of a source's observations that were left out, beforehand or by their weight; 0 of none."""
+    source, distances = calibration.adjustment.sources[i], residual_distances_px(calibration)[i]
+    is_out = ~np.isfinite(distances) | (calibration.adjustment.weight[i] < _LEFT_OUT_WEIGHT)
+    return (int(is_out.sum()) + source.n_rejected) / max(len(distances) + source.n_rejected, 1)
 
 
 def _source(calibration: RigCalibration, i: int) -> dict[str, Any]:
@@ -159,9 +167,7 @@ def _source(calibration: RigCalibration, i: int) -> dict[str, Any]:
         "median_px": _number(float(np.median(distances[is_used]))) if is_used.any() else None,
         "noise_sd_px": float(np.mean(adjusted.noise_px[i] * np.asarray(source.sd_px))),
         "held_out_rms_px": _number(_rms(calibration.held_out_px[source.name])),
-        "left_out_percent": 100 * float(np.mean(~is_used | (adjusted.weight[i] < _LEFT_OUT_WEIGHT)))
-        if len(distances)
-        else None,
+        "left_out_percent": 100 * _share_left_out(calibration, i) if len(distances) else None,
         "rms_px_by_camera": {
             name: _number(_rms(distances[source.camera == c])) for c, name in enumerate(calibration.rig.names)
         },

@@ -109,6 +109,8 @@ def test_outliers_are_no_evidence():
     strays = [tuple(uv) for uv in px[is_stray]]
     assert np.mean([uv in kept for uv in strays]) < 0.05
     assert np.mean([uv in kept for uv in sound]) > 0.95
+    n_seen = np.isfinite(px[..., 0]).sum(axis=-1)
+    assert source.n_rejected == n_seen[n_seen > 1].sum() - len(source.px)
 
 
 def test_lengths_join_the_markers_of_one_frame():

@@ -95,6 +95,7 @@ class Source:
     cluster: Ints | None = None  # (n,) observations of one cluster have correlated errors; None: independent
     lengths: Lengths | None = None
     lags: ObservationLags | None = None
+    n_rejected: int = 0  # observations beside these, left out beforehand as they contradict one another
 
     def __post_init__(self) -> None:
         n, p, m = len(self.px), len(self.points), self.n_moments

@@ -125,7 +125,10 @@ def wand_source(rig: Rig, tracks: WandTracks) -> Source:
     is_known = np.isfinite(consensus.points[..., 0]) & ~_has_wrong_length(tracks, consensus.points)
     index_of_point = np.full(is_known.shape, -1)
     index_of_point[is_known] = np.arange(is_known.sum())
-    frame, marker, column = np.nonzero(consensus.is_used & is_known[..., None])
+    is_used = consensus.is_used & is_known[..., None]
+    frame, marker, column = np.nonzero(is_used)
+    is_seen = np.isfinite(tracks.px).all(axis=-1)
+    is_seen &= is_seen.sum(axis=-1, keepdims=True) > 1  # by one camera alone it says nothing
     return Source(
         name="wand",
         camera=rows[column],
@@ -135,6 +138,7 @@ def wand_source(rig: Rig, tracks: WandTracks) -> Source:
         is_free=np.ones(is_known.sum(), bool),
         sd_px=0.5,
         lengths=_lengths(tracks, index_of_point),
+        n_rejected=int((is_seen & ~is_used).sum()),
     )
 
 
