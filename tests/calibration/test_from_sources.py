@@ -58,6 +58,12 @@ def test_a_place_that_no_source_shows_is_open(by_board):
     assert "open" in next(line for line in said.splitlines() if line.startswith(RIG.names[1]))
 
 
+def test_left_out_errors_far_beyond_the_fits_bring_a_warning(by_board):
+    assert "what is left out of the fit" not in describe_calibration(by_board)
+    far = {name: 5 * distances for name, distances in by_board.held_out_px.items()}
+    assert "warning: what is left out of the fit lies 5" in describe_calibration(replace(by_board, held_out_px=far))
+
+
 @pytest.fixture(scope="module")
 def by_board(recordings):
     document = {"camera": videos(), "board": {"file": "board.toml", "sync": "exact"}}

@@ -15,6 +15,7 @@ from airborne.cameras import Camera
 from airborne.types import Array
 
 _LEFT_OUT_WEIGHT = 0.1  # observations of a smaller weight count as left out
+_SUSPECT_RATIO = 2.0  # of left-out errors to those of the fit: of recordings that fix the cameras 1.0 to 1.1
 _OPEN_SD_M = 1.0  # of a camera's place: no source shows where it is
 
 
@@ -141,6 +142,12 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
                 f"{share:.0%} of source '{source.name}' fit nothing: it contradicts others, is of other cameras, or "
                 "has points exchanged in some of them"
             )
+    rms_px, held_out_px = calibration.adjustment.rms_px(), _rms(np.concatenate(list(calibration.held_out_px.values())))
+    if held_out_px > _SUSPECT_RATIO * rms_px:
+        sentences.append(
+            f"what is left out of the fit lies {held_out_px / rms_px:.1f} times as far from its prediction as what is "
+            "in it: the standard deviations are too small by about as much; record more poses, slower, in every corner"
+        )
     places = [name for i, name in enumerate(calibration.rig.names) if _place_sd_m(_sds(calibration, i)) > _OPEN_SD_M]
     if places:
         sentences.append(
