@@ -160,6 +160,10 @@ def test_lines_are_reported_as_they_are_found(folder):
 def test_players_are_checked_against_the_cameras(tmp_path):
     path = write_trial(tmp_path / "trial", 3)
     assert check_trial(path).well[-1].startswith("start: frame 0, Anna")
+    text = path.read_text(encoding="utf-8").replace("hip_left", "hip_x").replace("hip_right", "hip_left")
+    path.write_text(text.replace("hip_x", "hip_right"), encoding="utf-8")
+    notes = check_trial(path).well[-2:]
+    assert all("the hips point the other way than knees and ankles" in note for note in notes), notes
 
 
 def test_the_first_frame_is_drawn_and_then_replaced_by_the_whole_run(folder, tmp_path):

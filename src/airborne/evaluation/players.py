@@ -83,8 +83,7 @@ class PlayersComparison:
             f"{self.n_matched} of {self.n_truth} true times matched, at most "
             f"{1e3 * self.largest_time_offset_s:.1f} ms off"
         ]
-        for name, errors in self.players.items():
-            lines += _error_lines(name, errors)
+        lines += [line for name, errors in self.players.items() for line in _error_lines(name, errors)]
         lines += question_units(max((each.parts["all"].median_mm for each in self.players.values()), default=math.nan))
         lines += [jump.describe() for jump in self.jumps]
         if self.not_compared:

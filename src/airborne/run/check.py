@@ -14,7 +14,7 @@ from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, is_seen
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source
-from airborne.run.players_tracker import players_tracker_of
+from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
@@ -137,10 +137,12 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         who = "players are" if trial.has_players else "body is"
         checks.add(f"start: not given; the {who} looked for when the trial is tracked")
     elif trial.has_players:
-        checks.attempt(
+        tracker = checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
             lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.start.player)}",
         )
+        if tracker is not None:
+            recording.events.extend(start_notes(player_starts(trial, recording.rig)))
     else:
         model = trial.model()
         first = checks.attempt(

@@ -18,7 +18,7 @@ from airborne.motion.jumps.heights import LEAST_RATE_HZ, measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
-from airborne.run.players_tracker import player_starts, players_tracker_of
+from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
 from airborne.tracking import Status
 from airborne.tracking.players import PlayersStep, PlayerStart, PlayersTracker, StepTracker
 from airborne.tracking.tracker import track_frames
@@ -57,9 +57,9 @@ class PlayersRun:
     def open(cls, trial: Trial, opened: Opened[Recording | LiveRecording]) -> PlayersRun:
         """Make the tracker, which checks the players' starts against the cameras."""
         rig = opened.recording.rig
-        return cls(
-            trial, opened.recording, opened.calibration, players_tracker_of(trial, rig), player_starts(trial, rig)
-        )
+        tracker, starts = players_tracker_of(trial, rig), player_starts(trial, rig)
+        opened.recording.events.extend(start_notes(starts))
+        return cls(trial, opened.recording, opened.calibration, tracker, starts)
 
     @property
     def n_frames(self) -> int | None:

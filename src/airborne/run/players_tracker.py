@@ -20,8 +20,10 @@ from airborne.tracking.players import PlayerStart, PlayersTracker
 from airborne.trial.file import Trial
 from airborne.trial.players import start_of
 from airborne.trial.settings import ParticleSettings
+from airborne.types import Array
 from airborne.video import Frames, View
 
+_CLEARLY = 0.5  # cosine of lines from right to left: 60 degrees
 _AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 _LARGEST_TABLE_BYTES = 50_000_000  # larger files are refused
@@ -59,6 +61,27 @@ def player_starts(trial: Trial, rig: Rig) -> tuple[PlayerStart, ...]:
         except ValueError as error:
             raise TrialError(f"{trial.name}: {error}") from None
     return tuple(starts)
+
+
+def start_notes(starts: Sequence[PlayerStart]) -> list[str]:
+    """Say of each player whose hips point the other way than knees and ankles that sides may be exchanged there."""
+    notes = []
+    for start in starts:
+        if not start.has_legs:
+            continue
+        hips, knees, ankles = (
+            start.joints_m[f"{part}_left"] - start.joints_m[f"{part}_right"] for part in ("hip", "knee", "ankle")
+        )
+        if max(_cosine(hips, knees), _cosine(hips, ankles)) < -_CLEARLY < _CLEARLY < _cosine(knees, ankles):
+            notes.append(
+                f"player '{start.name}': the hips point the other way than knees and ankles; legs that cross, or left "
+                "and right exchanged there?"
+            )
+    return notes
+
+
+def _cosine(a: Array, b: Array) -> float:
+    return float(a @ b / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-9))
 
 
 def compile_kernels(trial: Trial) -> None:
