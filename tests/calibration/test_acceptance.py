@@ -49,6 +49,8 @@ def test_one_point_that_spoils_a_fit_of_least_squares_is_a_reason(tmp_path):
     written, reasons = write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, GOOD, residual_px))
     assert written.name == "calib.rejected.toml"
     assert len(reasons) == 1 and reasons[0].startswith(f"{RIG.names[0]}: a control point lies 90 px from where")
+    missed = Errors(ERRORS, GOOD, residual_px, [f"P{k}" for k in range(20)])
+    assert "that miss most (P3 by 90 px, P" in write_accepted(tmp_path / "calib.toml", RIG, missed)[1][0]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -28,15 +28,17 @@ class Errors(NamedTuple):
     rms_px: Mapping[str, float]
     held_out_px: Mapping[str, Array]  # (n,) distances of left-out observations from their predictions
     residual_px: Mapping[str, Array] = {}  # (n, 2) of a fit by least squares, which a single wrong point spoils
+    points: Sequence[str] = ()  # (n,) their names
 
     @classmethod
-    def of(cls, calibration: Calibration | RigCalibration) -> Errors:
-        """Return those of a calibration from control points, or from sources."""
+    def of(cls, calibration: Calibration | RigCalibration, points: Sequence[str] = ()) -> Errors:
+        """Return those of a calibration from control points of these names, or from sources."""
         if isinstance(calibration, Calibration):
             return cls(
                 rms_px={fit.name: fit.rms_px for fit in calibration.fits},
                 held_out_px={fit.name: np.linalg.norm(fit.held_out_px, axis=1) for fit in calibration.fits},
                 residual_px={fit.name: fit.residual_px for fit in calibration.fits},
+                points=points,
             )
         names = calibration.rig.names
         return cls(
@@ -71,18 +73,20 @@ def require_plausible(calibration: Calibration | RigCalibration) -> None:
 
 def _reasons(rig: Rig, missed: Errors) -> Iterator[str]:
     yield from _absurd_errors(rig, missed.held_out_px)
-    yield from _spoiled_fits(rig, missed.residual_px)
+    yield from _spoiled_fits(rig, missed)
 
 
-def _spoiled_fits(rig: Rig, residual_px: Mapping[str, Array]) -> Iterator[str]:
+def _spoiled_fits(rig: Rig, missed: Errors) -> Iterator[str]:
     """Yield a sentence for every camera one of whose points lies absurdly far from where the fit expects it."""
-    for name, residual in residual_px.items():
-        camera = rig[name]
-        largest, limit = float(np.nanmax(np.linalg.norm(residual, axis=1))), _ABSURD_SHARE * max(camera.size)
-        if largest > limit:
+    for name, residual in missed.residual_px.items():
+        distance, limit = np.nan_to_num(np.linalg.norm(residual, axis=1)), _ABSURD_SHARE * max(rig[name].size)
+        if distance.max() > limit:
+            worst = [k for k in np.argsort(-distance)[:_N_NAMED] if k < len(missed.points)]
+            listed = ", ".join(f"{missed.points[k]} by {distance[k]:.0f} px" for k in worst)
             yield (
-                f"{name}: a control point lies {largest:.0f} px from where the fit expects it, more than {limit:.0f} "
-                "px, and spoils the fit: mend or leave out the points that miss most, of which two may be mixed up"
+                f"{name}: a control point lies {distance.max():.0f} px from where the fit expects it, more than "
+                f"{limit:.0f} px, and spoils the fit: mend or leave out the points that miss most"
+                f"{f' ({listed})' if listed else ''}, of which two may be mixed up"
             )
 
 

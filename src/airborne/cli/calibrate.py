@@ -109,7 +109,7 @@ def _from_control_points(
         raise AirborneError("--size is missing: give the image size in pixels, such as 768x576")
     table = read_control_points(points)
     calibration = calibrate_cameras(table, _sizes(size, table.cameras), method=method)
-    written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration))
+    written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration, table.names))
     print(json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration))
     if not as_json:
         print(f"written: {written}")

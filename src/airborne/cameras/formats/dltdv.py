@@ -162,7 +162,10 @@ def _read_table(path: Path) -> tuple[list[str], Array]:
         try:
             values[number] = np.reshape([float(cell) if cell else np.nan for cell in cells], len(header))
         except ValueError:
-            raise CalibrationError(f"{path}, row {line}: expected {len(header)} numbers") from None
+            columns = ",".join(header)[:80]
+            raise CalibrationError(
+                f"{path}, row {line}: expected {len(header)} numbers under {columns}; {_EXPECTED}"
+            ) from None
     return header, np.where(np.abs(values) < 1e12, values, np.nan)
 
 
