@@ -111,7 +111,8 @@ def describe_calibration(calibration: RigCalibration) -> str:
         lines.append("standard deviations of places are those of the cameras among each other")
     lines += [f"wrong before: {text}" for text in report["mended"]]
     lines += [
-        f"{name}: now {camera['moved_m']:.3f} m and {camera['turned_deg']:.2f} degrees from where it was thought to be"
+        f"{name}: now, as written, {camera['moved_m']:.3f} m and {camera['turned_deg']:.2f} degrees from where it was "
+        "thought to be"
         for name, camera in report["cameras"].items()
         if "moved_m" in camera
     ]
