@@ -26,3 +26,25 @@ def test_frames_may_be_tracked_where_joints_are_not(tmp_path):
     assert found["share_tracked"] == 1
     assert found["share_joints_tracked"] == pytest.approx(11 / 20)
     assert "share_joints_tracked" not in row(tmp_path)
+
+
+def test_of_players_the_highest_jump_stands_in_the_row_or_else_the_longest(tmp_path):
+    def jump(player, **more):
+        return {
+            "player": player,
+            "hip_height_m": None,
+            "foot_height_m": None,
+            "takeoff_s": 1.0,
+            "landing_s": 1.5,
+            **more,
+        }
+
+    short, long = jump("Anna", flight_s=0.4), jump("Berta", flight_s=0.6)
+    found = row(tmp_path, jumps=[short, long, jump("Carla", flight_s=None)])
+    assert (found["n_jumps"], found["player"], found["flight_s"]) == (3, "Berta", 0.6)
+    assert found["hip_height_m"] is None
+    high = jump("Anna", flight_s=0.4, hip_height_m=0.5, hip_height_m_low=0.45, hip_height_m_high=0.55)
+    found = row(tmp_path, jumps=[high, long])
+    assert (found["player"], found["hip_height_m"]) == ("Anna", 0.5)
+    assert found["hip_height_m_sd"] == pytest.approx(0.1 / (2 * 1.96), rel=1e-3)
+    assert row(tmp_path, jumps=[jump("Carla", flight_s=None)]).keys() & {"player", "n_jumps"} == {"n_jumps"}

@@ -100,12 +100,17 @@ def _jump(path: Path) -> TableRow:
 
 
 def _highest_jump(jumps: list[dict[str, Any]]) -> TableRow:
-    """Return how many jumps players made, and the highest by the hips, its sd from its 95 % interval."""
-    known = [jump for jump in jumps if isinstance(jump.get(_OF_A_JUMP[0]), float)]
+    """Return how many jumps players made, and the highest, its sd from its 95 % interval.
+
+    The highest by the hips, or where no such height is known the longest.
+    """
     row: dict[str, Any] = {"n_jumps": len(jumps)}
-    if not known:
+    measures = ("hip_height_m", "flight_s")
+    known = {name: [jump for jump in jumps if isinstance(jump.get(name), float)] for name in measures}
+    by = next((name for name in measures if known[name]), None)
+    if by is None:
         return row
-    highest = max(known, key=lambda jump: jump[_OF_A_JUMP[0]])
+    highest = max(known[by], key=lambda jump: jump[by])
     row["player"] = highest["player"]
     for name in _OF_A_JUMP:
         low, high = highest.get(f"{name}_low"), highest.get(f"{name}_high")
