@@ -15,8 +15,10 @@ from airborne.cameras import Camera
 from airborne.types import Array
 
 _LEFT_OUT_WEIGHT = 0.1  # observations of a smaller weight count as left out
-_SUSPECT_RATIO = 2.0  # of left-out errors to those of the fit: of recordings that fix the cameras 1.0 to 1.1
-_OPEN_SD_M = 1.0  # of a camera's place: no source shows where it is
+# of left-out errors to those of the fit; chosen between recordings that fix the cameras, 1.0 to 1.1, and two that do
+# not, a few points of a court and four webcams that are not synchronised, 2.1 and 2.7
+_SUSPECT_RATIO = 2.0
+_OPEN_SD_M = 1.0  # of a camera's place; chosen between wands, up to 0.2, and lenses without any place, 85 and more
 
 
 def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
@@ -24,7 +26,7 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
     adjusted = calibration.adjustment
     cameras = {}
     for i, camera in enumerate(calibration.rig):
-        sd = _sds(calibration, i)
+        sd = _sds(calibration, camera)
         fit = calibration.inputs.lenses.get(camera.name)
         cameras[camera.name] = {
             "size_px": list(camera.size),
@@ -49,7 +51,7 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
         "sources": {source.name: _source(calibration, i) for i, source in enumerate(adjusted.sources)},
         "rms_px": _number(adjusted.rms_px()),
         "median_px": _number(float(np.nanmedian(np.concatenate(residual_distances_px(calibration))))),
-        "held_out_rms_px": _number(_rms(np.concatenate(list(calibration.held_out_px.values())))),
+        "held_out_rms_px": _number(_held_out_rms_px(calibration)),
         "world": calibration.world,
         "sd_is_within_the_rig": adjusted.is_gauge_free,
         "mended": [mending.describe() for mending in calibration.resections],
@@ -62,10 +64,10 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
     }
 
 
-def _sds(calibration: RigCalibration, i: int) -> dict[str, float]:
+def _sds(calibration: RigCalibration, camera: Camera) -> dict[str, float]:
     """Return the standard deviations of what was adjusted of a camera, by name."""
-    names = FISHEYE_PARAMETERS if tuple(calibration.rig)[i].lens == "fisheye" else CAMERA_PARAMETERS
-    values = calibration.adjustment.camera_sd[i]
+    names = FISHEYE_PARAMETERS if camera.lens == "fisheye" else CAMERA_PARAMETERS
+    values = calibration.adjustment.camera_sd[calibration.rig.names.index(camera.name)]
     return {name: float(value) for name, value in zip(names, values, strict=True) if name and value > 0}
 
 
@@ -143,19 +145,23 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
                 f"{share:.0%} of source '{source.name}' fit nothing: it contradicts others, is of other cameras, or "
                 "has points exchanged in some of them"
             )
-    rms_px, held_out_px = calibration.adjustment.rms_px(), _rms(np.concatenate(list(calibration.held_out_px.values())))
+    rms_px, held_out_px = calibration.adjustment.rms_px(), _held_out_rms_px(calibration)
     if held_out_px > _SUSPECT_RATIO * rms_px:
         sentences.append(
             f"what is left out of the fit lies {held_out_px / rms_px:.1f} times as far from its prediction as what is "
             "in it: the standard deviations are too small by about as much; record more poses, slower, in every corner"
         )
-    places = [name for i, name in enumerate(calibration.rig.names) if _place_sd_m(_sds(calibration, i)) > _OPEN_SD_M]
+    places = [each.name for each in calibration.rig if _place_sd_m(_sds(calibration, each)) > _OPEN_SD_M]
     if places:
         sentences.append(
             f"no source shows where {', '.join(places)} stand: their places are those of [start], which were found "
             "with other lenses; add control points, a wand, a court or a board that several cameras see"
         )
     return tuple(sentences)
+
+
+def _held_out_rms_px(calibration: RigCalibration) -> float:
+    return _rms(np.concatenate(list(calibration.held_out_px.values())))
 
 
 def _share_left_out(calibration: RigCalibration, i: int) -> float:

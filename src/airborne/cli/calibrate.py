@@ -81,7 +81,7 @@ def calibrate_command(
         return
     if board is None and files[0].suffix.lower() not in (*_TABLES, ".toml"):
         raise AirborneError(f"{files[0]} is no table and no file of sources; videos and images need --board or --wand")
-    if board is None and len(files) == 1 and files[0].suffix.lower() != ".toml":
+    if is_table:
         if report is not None:
             raise AirborneError("--report goes with sources; the result of a table of control points alone is printed")
         _from_control_points(files[0], size, output, method=method, as_json=as_json)

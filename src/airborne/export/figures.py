@@ -21,8 +21,7 @@ from airborne.motion import (
     Motion,
     has_inertias,
     joint_angles,
-    joint_statuses,
-    landmarks,
+    known_landmarks,
     measure_flight,
     root_angles,
 )
@@ -154,7 +153,7 @@ def joint_status_figure(motion: Motion, model: BodyModel) -> Figure:
 
     Raises ResultError where the motion is another body's.
     """
-    status = joint_statuses(motion, model, landmarks(motion, model)[1])
+    *_, status = known_landmarks(motion, model)
     figure, ((axes,),) = panels.panel_figure(1, 1, row_in=0.16 * len(model.landmarks) + 0.5)
     for row, column in enumerate(status.T):
         for each, colour in JOINT_COLOURS.items():

@@ -112,7 +112,7 @@ def known_landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array, NDA
 
 def doubtful_segments(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     """Return which segments have a landmark, or an end, that is not tracked: (n, segments)."""
-    status = joint_statuses(motion, model, landmarks(motion, model)[1])
+    *_, status = known_landmarks(motion, model)
     doubtful = np.zeros((len(motion), len(model.segments)), np.bool_)
     for landmark, is_doubtful in zip(model.landmarks, (status != JointStatus.TRACKED.value).T, strict=True):
         segment = model.index_of(landmark.segment)

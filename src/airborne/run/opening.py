@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Generic, TypeVar
 
 from airborne.calibration.acceptance import require_plausible
@@ -58,12 +57,12 @@ def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opene
     Images are converted lazily, only in the regions that are used, but for fields whose missing rows are interpolated.
     `facts` are the videos', where `inspect` has been called before.
     """
-    if all(source.is_left_out(trial.start.frame) for source in map(partial(video_source, trial), trial.camera)):
+    fields_as = "rows" if trial.has_players else FIELD_MODES[trial.settings.method]
+    sources = [video_source(trial, camera) for camera in trial.camera]
+    if all(source.is_left_out(trial.start.frame) for source in sources):
         raise TrialError(
             f"{trial.name}: [[mask]] leaves every camera out at start.frame = {trial.start.frame}; leave one of them in"
         )
-    fields_as = "rows" if trial.has_players else FIELD_MODES[trial.settings.method]
-    sources = [video_source(trial, camera) for camera in trial.camera]
     cameras = open_cameras(trial, facts)
     recording = open_recording(
         sources,

@@ -23,7 +23,7 @@ from airborne.trial.settings import ParticleSettings
 from airborne.types import Array
 from airborne.video import Frames, View
 
-_CLEARLY = 0.5  # cosine of lines from right to left: 60 degrees
+_CLEARLY = 0.5  # cosine of lines from right to left; chosen so that a pelvis may turn 60 degrees over the legs
 _AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 _LARGEST_TABLE_BYTES = 50_000_000  # larger files are refused

@@ -20,16 +20,8 @@ from airborne.export.overlays import OverlaysAs
 from airborne.export.summary import joint_warnings
 from airborne.io.figures import names_not_drawn
 from airborne.io.folder_lock import sole_writer
-from airborne.motion import Motion, PlayersMotion
-from airborne.motion.run_folder import (
-    CALIBRATION,
-    REPORT,
-    SUMMARY,
-    holds_players,
-    read_body_run,
-    read_players_run,
-    read_summary,
-)
+from airborne.motion import Motion, PlayersMotion, read_motion, read_players
+from airborne.motion.run_folder import CALIBRATION, MOTION, REPORT, SUMMARY, read_summary
 from airborne.run.body import BodyRun
 from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
@@ -143,7 +135,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
     folder, recording = options.folder, subject.recording
     identity = run_identity(subject.trial, live=options.live, take=options.take)
-    if options.resume and (finished := _finished_run(folder, identity, options.drawn)) is not None:
+    if options.resume and (finished := _finished_run(folder, identity, subject.table, options.drawn)):
         return finished
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
     write_pose2sim(folder / CALIBRATION, recording.rig)
@@ -184,11 +176,11 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     return TrackResult(motion, summary)
 
 
-def _finished_run(folder: Path, identity: dict[str, Any], drawn: OverlaysAs | None) -> TrackResult | None:
+def _finished_run(folder: Path, identity: dict[str, Any], table: str, drawn: OverlaysAs | None) -> TrackResult | None:
     """Return the run that a folder holds; None where something is still to be tracked or drawn."""
     if not is_finished(folder, identity) or (drawn is not None and not (folder / REPORT).is_file()):
         return None
-    motion = read_players_run(folder) if holds_players(folder) else read_body_run(folder)[0]
+    motion = (read_motion if table == MOTION else read_players)(folder / table)
     summary = read_summary(folder)
     return TrackResult(motion, summary, was_finished=True) if len(motion) == summary["n_frames"] else None
 

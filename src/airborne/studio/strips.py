@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
+from airborne.motion import JointStatus, Motion, known_landmarks
 from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE, read_covariances
 from airborne.motion.files import parse_line
 from airborne.motion.run_folder import BODY, JOINTS, MOTION, holds_players
@@ -115,7 +115,7 @@ def _block_ranks(run: Path, first: int, lines: bytes, joints: tuple[str, ...]) -
     covariance = read_covariances(run / COVARIANCE_FILE, len(motion), size=6 + 3 * len(joints), first=first)
     lasting = read_covariances(run / LASTING_FILE, len(motion), size=6, first=first)
     motion = replace(motion, covariance=covariance, lasting=None if np.isnan(lasting).any() else lasting)
-    return ranks_of(joint_statuses(motion, model, landmarks(motion, model)[1]))
+    return ranks_of(known_landmarks(motion, model)[-1])
 
 
 def ranks_of(status: NDArray[np.str_]) -> NDArray[np.uint8]:

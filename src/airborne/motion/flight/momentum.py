@@ -118,10 +118,11 @@ def _inertia_kinds(model: BodyModel) -> Array:
     By the factor 1 + x that all inertias of a kind change the momentum changes by x times what its row says of the
     segments' momenta: the whole mass is known, so that the others' inertias fall as these rise.
     """
+    if not model.has_joints:
+        return np.zeros((0, len(model.segments)))
     stems = [without_side(segment.name) for segment in model.segments]
-    kinds = np.array([[stem == kind for stem in stems] for kind in dict.fromkeys(stems) if model.has_joints], float)
+    kinds = np.array([[stem == kind for stem in stems] for kind in dict.fromkeys(stems)], float)
     mass = np.array([0.0 if segment.inertia is None else segment.inertia.mass_kg for segment in model.segments])
-    kinds = kinds.reshape(-1, len(stems))
     return kinds - (kinds @ mass / mass.sum())[:, None]
 
 

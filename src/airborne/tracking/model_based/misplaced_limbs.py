@@ -29,11 +29,9 @@ _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
 DISTINCT_M = 0.1  # two places of a limb, of which some joint is this far apart: about the width of an arm
 SAME_M = 0.02  # fits from two places of a limb that are no further apart end in the same
-_CLEARLY_LESS_NATS = (
-    1.0  # of all places elsewhere, before a search ends at its starts; chosen on synthetic people in two
-)
-# and three views: of 657 searches 271 end, of which 3 moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up
-# to 0.6 m
+# of all places elsewhere, before a search ends at its starts; chosen on synthetic people in two and three views: of 657
+# searches 271 end, of which 3 moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up to 0.6 m
+_CLEARLY_LESS_NATS = 1.0
 _FEWEST_PX = 25  # a segment with fewer visible pixels in a view is occluded there, not misplaced
 _MISPLACED = 0.5  # share of the body's precision, below which a segment is misplaced
 
