@@ -178,7 +178,7 @@ def in_a_table_of_trials(folder, name):
 
     def plan():
         tasks = plan_tasks(list_trials(str(folder)), folder / "results", pictures=False)
-        lines.extend(describe_plan(tasks))
+        lines.extend(describe_plan(tasks)[0])
 
     lines = []
     return [*refuse_or_open(plan), *lines]

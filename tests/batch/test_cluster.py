@@ -163,14 +163,14 @@ def check_batches(season, scheduler, tmp_path, capsys):
     )
     answer = json.loads(capsys.readouterr().out)
     assert answer["counts"] == {"unchanged": 2, "failed": 1}
-    assert in_process("batch", season, "-o", tmp_path / "there", "--no-pictures", "--dry-run") == 0
+    assert in_process("batch", season, "-o", tmp_path / "there", "--no-pictures", "--dry-run") == 1
     assert "good: leave alone" in capsys.readouterr().out
 
 
 def test_a_dry_run_names_a_video_that_is_missing(season, tmp_path, capsys):
     shutil.copytree(season / "good", tmp_path / "trials" / "good")
     (tmp_path / "trials" / "good" / "cam2.mp4").unlink()
-    assert in_process("batch", tmp_path / "trials", "-o", tmp_path / "out", "--dry-run") == 0
+    assert in_process("batch", tmp_path / "trials", "-o", tmp_path / "out", "--dry-run") == 1
     assert re.match(r"good: cannot be tracked: .*cam2\.mp4", capsys.readouterr().out)
 
 

@@ -45,9 +45,11 @@ def test_a_height_that_nobody_saw_is_unknown_and_uncertain_frames_are_said(tmp_p
     (jump,) = measure_jumps(motion)
     row = {**jump_row(jump), "hip_height_m": np.nan, "n_uncertain": 4}
     _, first, _ = players_summary(summary_of([row]))
-    assert first.startswith(f"one, jump 1: {UNKNOWN_TEXT}, hips over standing")
+    why = "a peak takes five known frames around it, seen by two cameras or more"
+    assert first.startswith(f"one, jump 1: {UNKNOWN_TEXT} ({why}), hips over standing")
     assert first.endswith("; 4 of its frames are uncertain")
-    assert f"<b>{UNKNOWN_TEXT}</b>" in write_players_report(tmp_path, summary_of([row]), motion).read_text()
+    page = write_players_report(tmp_path, summary_of([row]), motion).read_text()
+    assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"how high the hips rose is not known: {why}." in page
 
 
 def test_its_viewer_shows_one_frame_in_a_browser(tmp_path):

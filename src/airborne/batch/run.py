@@ -88,15 +88,15 @@ def _video_bytes(trial: BatchTrial) -> int:
         return 0  # its task will say what is wrong
 
 
-def describe_plan(tasks: Sequence[Task]) -> list[str]:
-    """Say of each task in one line what a batch would do."""
+def describe_plan(tasks: Sequence[Task]) -> tuple[list[str], bool]:
+    """Say of each task in one line what a batch would do; and whether every trial can be tracked."""
     words = {
         "new": "track",
         "stopped": "go on",
         "changed": "track again, its inputs changed",
         "unchanged": "leave alone",
     }
-    lines = []
+    lines, is_sound = [], True
     for task in tasks:
         try:
             trial = read_trial(task.trial.path)
@@ -107,4 +107,5 @@ def describe_plan(tasks: Sequence[Task]) -> list[str]:
             lines.append(f"{task.trial.name}: {words[status]}")
         except AirborneError as error:
             lines.append(f"{task.trial.name}: cannot be tracked: {error}")
-    return lines
+            is_sound = False
+    return lines, is_sound

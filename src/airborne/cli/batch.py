@@ -34,7 +34,8 @@ def batch_command(
 ) -> None:
     """Track many trials, each into its folder of the output; give the command again to go on after a stop.
 
-    Only what is missing, stopped or changed is tracked. Writes trials.csv and index.html. Exit code 1 if some failed.
+    Only what is missing, stopped or changed is tracked. Writes trials.csv and index.html. Exit code 1 if some failed or,
+    with --dry-run, would fail.
 
     Example: airborne batch trials -o results --workers 4
     """
@@ -43,9 +44,9 @@ def batch_command(
 
     listed = list_trials(trials)
     if dry_run:
-        lines = describe_plan(plan_tasks(listed, output, pictures=pictures))
+        lines, is_sound = describe_plan(plan_tasks(listed, output, pictures=pictures))
         print(json.dumps(lines, ensure_ascii=False) if as_json else "\n".join(lines))
-        return
+        raise typer.Exit(0 if is_sound else _SOME_FAILED)
     machines = Machines(scheduler=scheduler, workers=workers, memory=memory)
     try:
         result = run_batch(

@@ -36,6 +36,7 @@ _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
 _HEIGHTS = ("hips", "feet", "flight time", "take-off speed")
+_PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or more"
 _JUMPS_CAPTION = (
     "Heights are in cm, each with its 95 % interval. Quote that of the hips over standing: it needs neither the moment "
     "of take-off nor that of landing, and tucked legs do not add to it. Never compare it with a height of another "
@@ -101,6 +102,9 @@ def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
                 f"{name}: {player['n_below_two_cameras']} of {n} frames rest on fewer than two cameras, so that depth "
                 "is a guess."
             )
+    for jump in summary["jumps"]:
+        if _interval_cm(jump, "hips") == UNKNOWN_TEXT:
+            yield f"{jump['player']}, jump {jump['jump']}: how high the hips rose is not known: {_PEAK_TAKES}."
     yield from _drop_notes(summary)
 
 
@@ -114,7 +118,8 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
         hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
         n = jump["n_uncertain"]
         warning = f"; {n} of its frames {'is' if n == 1 else 'are'} uncertain" if n else ""
-        yield f"{jump['player']}, jump {jump['jump']}: {hips}, hips over standing (95 % interval){warning}"
+        why = f" ({_PEAK_TAKES})" if hips == UNKNOWN_TEXT else ""
+        yield f"{jump['player']}, jump {jump['jump']}: {hips}{why}, hips over standing (95 % interval){warning}"
         pairs = zip(_HEIGHTS[1:], others, strict=True)
         yield "  by other definitions: " + ", ".join(f"{what} {height}" for what, height in pairs)
     yield from _drop_notes(summary)

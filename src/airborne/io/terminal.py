@@ -38,7 +38,7 @@ class _ProgressLines:
     def __call__(self, done: int, total: int | None) -> None:
         if time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + _SECONDS_A_LINE
-            errors.print(f"{self._what}: {done} of {total or 'unknown'}", markup=False)
+            errors.print(f"{self._what}: {done}{f' of {total}' if total else ''}", markup=False)
 
 
 class Stages(ExitStack):

@@ -72,7 +72,7 @@ def prepare_folder(
         _remove_run(folder)
     if rows.exists() and not resume:
         raise ResultError(
-            f"{folder} already holds a run; give --resume to go on, --overwrite to replace it, or another folder"
+            f"{folder} already holds a run; resume it (--resume), overwrite it (--overwrite), or give another folder"
         )
     if not rows.exists():
         write_json(record, identity)

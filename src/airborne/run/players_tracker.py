@@ -59,7 +59,7 @@ def player_starts(trial: Trial, rig: Rig) -> tuple[PlayerStart, ...]:
         try:
             starts.append(start_of(player.name, dict(zip(names, points.tolist(), strict=True))))
         except ValueError as error:
-            raise TrialError(f"{trial.name}: {error}") from None
+            raise TrialError(f"{trial.name}: player '{player.name}': {error}") from None
     return tuple(starts)
 
 

@@ -84,7 +84,7 @@ def track_trial(
     if live and first_frame:
         raise ResultError("a live run has no first frame to come back to; leave --live or --first-frame out")
     if overwrite and resume:
-        raise ResultError("a run is either resumed or overwritten; give one of --resume and --overwrite")
+        raise ResultError("a run is either resumed or overwritten (--resume, --overwrite); choose one")
     if not live:
         refuse_same_files(trial)
     if live and trial.start.find:

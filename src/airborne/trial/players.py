@@ -28,11 +28,11 @@ class PlayerTable(SettingsTable):
     @model_validator(mode="after")
     def _check_points(self) -> PlayerTable:
         if (self.joints_m is None) == (self.points_px is None):
-            raise ValueError(f"player '{self.name}': give joints_m or points_px, one of them")
+            raise ValueError("give joints_m or points_px, one of them")
         if isinstance(self.joints_m, dict):
             start_of(self.name, self.joints_m)
         elif isinstance(self.points_px, dict):
-            check_point_names(self.name, self.points_px)
+            check_point_names(self.points_px)
         return self
 
     @property
@@ -49,38 +49,38 @@ class PlayerTable(SettingsTable):
 
 def start_of(name: str, joints_m: Mapping[str, Sequence[float]]) -> PlayerStart:
     """Return a player's start of joints in metres; raises ValueError for those that cannot be a player's."""
-    check_point_names(name, joints_m)
+    check_point_names(joints_m)
     start = PlayerStart(name=name, joints_m={joint: np.array(point, float) for joint, point in joints_m.items()})
     far = [joint for joint, point in start.joints_m.items() if np.abs(point).max() > FARTHEST_M]
     if far:
-        raise ValueError(f"player '{name}': {far[0]} lies over {FARTHEST_M:g} m away; give metres")
+        raise ValueError(f"{far[0]} lies over {FARTHEST_M:g} m away; give metres")
     if start.has_legs:
         _check_legs(start)
     return start
 
 
-def check_point_names(name: str, points: Iterable[str]) -> None:
+def check_point_names(points: Iterable[str]) -> None:
     """Raise ValueError for a point that a player does not have, and where one is missing."""
     given, names = set(points), ("torso", *LEG_POINTS, *_FEET)
     unknown = [point for point in points if point not in names]
     missing = [point for point in names[:-2] if point not in given]
     if unknown:
-        raise ValueError(f"player '{name}': no point {', '.join(unknown)}; there are: {', '.join(names)}")
+        raise ValueError(f"no point {', '.join(unknown)}; there are: {', '.join(names)}")
     if "torso" in missing or (given != {"torso"} and missing):
         raise ValueError(
-            f"player '{name}': joints_m has no {', '.join(missing)}; give all of {', '.join(names[:-2])}, "
+            f"joints_m has no {', '.join(missing)}; give all of {', '.join(names[:-2])}, "
             "or the torso alone of a bystander"
         )
 
 
 def _check_legs(start: PlayerStart) -> None:
-    name, points = start.name, np.array([start.joints_m[point] for point in LEG_POINTS])
+    points = np.array([start.joints_m[point] for point in LEG_POINTS])
     if points[:2, 2].min() < points[4:, 2].max():
-        raise ValueError(f"player '{name}': a hip lies lower than an ankle; were they exchanged?")
+        raise ValueError("a hip lies lower than an ankle; were they exchanged?")
     under_m = -float(points[:, 2].min())
     if under_m > _MOST_UNDER_FLOOR_M:
-        raise ValueError(f"player '{name}': a joint lies {under_m:.2f} m under the floor, which must be z = 0")
+        raise ValueError(f"a joint lies {under_m:.2f} m under the floor, which must be z = 0")
     try:
         Legs.from_points(np.array(start.joints_m["torso"]), points)
     except BodyError as error:
-        raise ValueError(f"player '{name}': {error}") from error
+        raise ValueError(str(error)) from error
