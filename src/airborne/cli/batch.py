@@ -34,8 +34,8 @@ def batch_command(
 ) -> None:
     """Track many trials, each into its folder of the output; give the command again to go on after a stop.
 
-    Only what is missing, stopped or changed is tracked. Writes trials.csv and index.html. Exit code 1 if some failed or,
-    with --dry-run, would fail.
+    Only what is missing, stopped or changed is tracked. Writes trials.csv and index.html. Exit code 1 if some failed
+    or, with --dry-run, would fail.
 
     Example: airborne batch trials -o results --workers 4
     """
