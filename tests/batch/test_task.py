@@ -1,5 +1,6 @@
 """One trial of a batch: tracked once, resumed, tracked again when changed; what is wrong with it is one line."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -65,6 +66,26 @@ def test_only_what_is_missing_or_changed_is_tracked(good, tmp_path):
     assert inspect_folder(task, read_trial(task.trial.path))[0] == "changed"
     again = do_task(task)
     assert (again.status, again.row["n_frames"]) == ("done", 3)
+
+
+def test_a_changed_trial_that_cannot_be_tracked_fails_each_time_and_never_passes_off_the_old_run_as_its_own(
+    good, tmp_path
+):
+    folder = tmp_path / "throw"
+    shutil.copytree(good, folder)
+    task = task_of(folder, tmp_path / "out")
+    do_task(task)
+    text = (folder / "trial.toml").read_text()
+    (folder / "trial.toml").write_text(
+        re.sub(r"\[start\].*(?=\[track\])", "", text, flags=re.DOTALL)
+    )  # 4 frames are too few
+    assert [do_task(task).status for _ in range(2)] == ["failed", "failed"]
+    assert inspect_folder(task, read_trial(task.trial.path))[0] == "changed"
+    assert row_of(task.folder)["n_frames"] == 4  # what was there stays until there is something else
+    (folder / "trial.toml").write_text(text.replace("stop = 4", "stop = 3"))
+    again = do_task(task)
+    assert (again.status, again.row["n_frames"]) == ("done", 3)
+    assert do_task(task).status == "unchanged"
 
 
 def test_a_stopped_run_goes_on_to_the_same_bytes(good, tmp_path):

@@ -23,6 +23,7 @@ def folder(tmp_path_factory):
     run = folder / "results"
     camera = camera_looking_at("a", [3.0, -4.0, 1.5], [0, 0, 1.1], focal_px=300, size=SIZE)
     write_person_run(run, Rig((camera,)), N, RATE)
+    (run / "run.json").write_text('{"inputs": {}, "settings": {}, "version": "1"}')
     (run / "videos").mkdir()
     with VideoWriter(run / "videos" / "overlay_a.mp4", size=SIZE, rate=RATE) as writer:
         for k in range(N):

@@ -1,7 +1,5 @@
 """A video of another size than its calibration is refused, and the mend is the one that fits the two sizes."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from airborne.cameras import Rig
@@ -24,11 +22,11 @@ def test_mend_of_a_size(factor, mend):
     camera = CAMERAS[0]
     size = tuple(round(f * length) for f, length in zip(factor, camera.size, strict=True))
     with pytest.raises(VideoError, match="give the video that was calibrated") as error:
-        check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [SimpleNamespace(size=size)])
+        check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [size])
     assert "\n" not in str(error.value)
     assert mend in str(error.value) if mend else "saved_" not in str(error.value)
 
 
 def test_the_calibrated_size_passes():
     camera = CAMERAS[0]
-    check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [SimpleNamespace(size=camera.size)])
+    check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [camera.size])

@@ -22,7 +22,7 @@ from airborne.errors import AirborneError
 from airborne.export import write_json
 from airborne.export.pictures import thumbnail
 from airborne.io.text import read_json
-from airborne.motion.run_folder import MOTION, REPORT, SUMMARY, list_figures
+from airborne.motion.run_folder import MOTION, REPORT, RUN_RECORD, SUMMARY, list_figures
 from airborne.run.folder import run_identity
 from airborne.run.track import track_trial
 from airborne.trial.file import Trial, read_trial
@@ -56,7 +56,7 @@ class Task:
 
     @property
     def record(self) -> Path:
-        """Where is remembered of which inputs the folder's run is."""
+        """Where the inputs are remembered that the folder's run is made from."""
         return self.batch / LOGS / f"{self.trial.name}.json"
 
 
@@ -117,7 +117,8 @@ def _bring_to_end(task: Task, report: Report, note: Callable[[str], None]) -> Ta
     note(state)
     if state != "unchanged":
         if identity is not None:
-            write_json(task.record, {"identity": identity})
+            replaces = _run_stamp(task) if state == "changed" else None
+            write_json(task.record, {"identity": identity, "replaces": replaces})
         next_s = 0.0
 
         def tell(done: int, total: int | None) -> None:
@@ -146,13 +147,20 @@ def inspect_folder(task: Task, trial: Trial) -> tuple[FolderState, dict[str, Any
     except (OSError, ValueError):
         return "new", None  # tracking says which input is missing or damaged
     try:
-        known = read_json(task.record)["identity"]
-    except (OSError, ValueError, KeyError, TypeError):
+        record = read_json(task.record)
+        known, replaces = record["identity"], record.get("replaces")
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return ("stopped" if (task.folder / MOTION).is_file() else "new"), identity
-    if known != identity:
+    if known != identity or (replaces is not None and replaces == _run_stamp(task)):
         return "changed", identity
     is_finished = (task.folder / SUMMARY).is_file() and (not task.pictures or (task.folder / REPORT).is_file())
     return ("unchanged" if is_finished else "stopped"), identity
+
+
+def _run_stamp(task: Task) -> str | None:
+    """Return when the run in a task's folder began; by it a run that was to be replaced is known to be there still."""
+    path = task.folder / RUN_RECORD
+    return str(path.stat().st_mtime_ns) if path.is_file() else None
 
 
 def thumbnail_of(batch: Path, name: str) -> Path:

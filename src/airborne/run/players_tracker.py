@@ -33,9 +33,12 @@ _MOST_FRAMES = 1_000_000  # from the first to the last torso
 def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
     """Make the tracker of a trial's players for the cameras `rig`.
 
-    Raises TrialError for a player whom no camera sees at the start, and for an unusable table of torsos.
+    Raises TrialError for a player whom no camera sees at the start, where there are only bystanders, and for an
+    unusable table of torsos.
     """
     starts = player_starts(trial, rig)
+    if not any(start.has_legs for start in starts):
+        raise TrialError(f"{trial.name}: every player is a bystander; give one of them the points of the legs too")
     for start in starts:
         _check_visible(trial, start, rig)
     if not isinstance(trial.track, ParticleSettings):

@@ -14,7 +14,7 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError, count
 from airborne.motion import PlayersMotion
 from airborne.motion.rows import MotionRows, read_rows
-from airborne.motion.run_folder import BODY, CALIBRATION, JOINTS, MOTION, read_players_run
+from airborne.motion.run_folder import BODY, CALIBRATION, JOINTS, MOTION, RUN_RECORD, read_players_run
 from airborne.studio.folder import file_stamp
 from airborne.trial.file import Trial
 
@@ -76,9 +76,9 @@ def _read_players(run: Path, stamp: Any) -> PlayersMotion:
 
 
 def note_if_older(run: Path, path: Path) -> str:
-    """Say of a file that is older than the run in whose folder it lies that it was made of the run before."""
-    made_ns, *written_ns = (file_stamp(each)[1] for each in (path, run / MOTION, run / JOINTS))
-    return " (of the run before)" if 0 < made_ns < max(written_ns) else ""
+    """Say of a file that is older than the run in whose folder it lies, from its beginning, that another left it."""
+    made_ns, begun_ns = (file_stamp(each)[1] for each in (path, run / RUN_RECORD))
+    return " (of the run before)" if 0 < made_ns < begun_ns else ""
 
 
 def count_frames(trial: Trial, n_images: int) -> int:

@@ -21,6 +21,7 @@ from airborne.studio.writing import FOLDER, Editor, read_if_there, refuse_outer_
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.file import Trial
+from airborne.video.sizes import check_sizes
 
 _T = TypeVar("_T")
 
@@ -93,7 +94,14 @@ class Session:
             raise TrialError("the cameras are not calibrated yet; see the step Cameras")
         files = [project.file(str(table[key])) for key in ("file", "control_points") if key in table]
         stamp = project.cameras_stamp, repr(table), tuple(map(file_stamp, files))
-        return self._keep("rig", stamp, lambda: read_or_calibrate(self._as_far_as_cameras(), self.shown().sizes)[0])
+        return self._keep("rig", stamp, lambda: self._read_rig(project))
+
+    def _read_rig(self, project: Project) -> Rig:
+        sizes = self.shown().sizes
+        rig = read_or_calibrate(self._as_far_as_cameras(), sizes)[0]
+        source = {camera.name: project.source(camera) for camera in project.cameras}
+        check_sizes([source[name] for name in rig.names], rig, [sizes[name] for name in rig.names])
+        return rig
 
     def file(self, name: str) -> Path:
         """Return the path of a file of the folder; raises TrialError where it leads out of it."""

@@ -112,9 +112,16 @@ def without_mask(text: str, number: int) -> str:
     return tomlkit.dumps(document)
 
 
-def with_players(text: str, frame: int, start_of: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return a trial's text whose start is these players: name -> its `points_px` or `joints_m`."""
+def with_players(text: str, frame: int, start_of: Mapping[str, Mapping[str, Any]], *, keeps_found: bool = False) -> str:
+    """Return a trial's text whose start is these players: name -> its `points_px` or `joints_m`.
+
+    With `keeps_found`, others whose joints the text has in metres, as they are found, in the same frame stay.
+    """
     document = _parse(text)
+    before = document.get("start", {})
+    if keeps_found and before.get("frame", 0) == frame:
+        found = [each for each in before.get("player", []) if "joints_m" in each]
+        start_of = {**{each["name"]: {"joints_m": each["joints_m"]} for each in found}, **start_of}
     start, players = tomlkit.table(), tomlkit.aot()
     start.add("frame", frame)
     for name, points in start_of.items():

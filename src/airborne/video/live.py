@@ -290,5 +290,5 @@ def live_recording(
     Raises VideoError where a size differs from the calibration's.
     """
     facts = [camera.facts for camera in cameras if camera.facts is not None]
-    check_sizes([camera.source for camera in cameras], rig, facts)
+    check_sizes([camera.source for camera in cameras], rig, [fact.size for fact in facts])
     return LiveRecording(cameras, rig, every, start, stop)

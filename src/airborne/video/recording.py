@@ -181,7 +181,7 @@ def open_recording(
         )
     ordered = tuple(sources[by_name[name]] for name in rig.names)
     ordered_facts = tuple(facts[by_name[name]] if facts else inspect(sources[by_name[name]]) for name in rig.names)
-    check_sizes(ordered, rig, ordered_facts)
+    check_sizes(ordered, rig, [fact.size for fact in ordered_facts])
     _check_exposures(ordered, ordered_facts)
     _check_overlap(ordered, ordered_facts)
     recording = Recording(ordered, ordered_facts, rig, fields_as, every, start, stop, lazy)

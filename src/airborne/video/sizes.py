@@ -6,24 +6,30 @@ import math
 from collections.abc import Sequence
 
 from airborne.cameras import Rig
+from airborne.cameras.finding import join_names
 from airborne.errors import VideoError
-from airborne.video.decoding import VideoFacts, VideoSource
+from airborne.types import Size
+from airborne.video.decoding import VideoSource
 
 _SAME_SHAPE = 0.005  # of the ratio of two sizes: a resized picture is rounded to whole pixels, often to even ones
 
 
-def check_sizes(sources: Sequence[VideoSource], rig: Rig, facts: Sequence[VideoFacts]) -> None:
-    """Raise VideoError where the size of a video's images differs from its camera's in the calibration."""
-    for source, camera, fact in zip(sources, rig, facts, strict=True):
-        if fact.size != tuple(camera.size):
-            actual, expected = ("×".join(map(str, size)) for size in (fact.size, camera.size))
-            raise VideoError(
-                f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px; give the "
-                f"video that was calibrated, or the calibration of this size{_saved_otherwise(fact.size, camera.size)}"
-            )
+def check_sizes(sources: Sequence[VideoSource], rig: Rig, sizes: Sequence[Size]) -> None:
+    """Raise VideoError where the size (width, height) [px] of a video's images is not its camera's."""
+    given = list(zip(sources, rig, sizes, strict=True))
+    wrong = [(source, size, camera.size) for source, camera, size in given if tuple(size) != tuple(camera.size)]
+    if not wrong:
+        return
+    (source, size, calibrated), *others = wrong
+    actual, expected = ("×".join(map(str, each)) for each in (size, calibrated))
+    also = f", as little as that of {join_names([each.name for each, *_ in others])}" if others else ""
+    raise VideoError(
+        f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px{also}; give the "
+        f"video that was calibrated, or the calibration of this size{_saved_otherwise(size, calibrated)}"
+    )
 
 
-def _saved_otherwise(size: tuple[int, int], calibrated: tuple[int, int]) -> str:
+def _saved_otherwise(size: Size, calibrated: Size) -> str:
     """Say what to write for a video that shows what was calibrated, saved at another size or cut out of it."""
     across, down = (b / a for a, b in zip(size, calibrated, strict=True))
     if math.isclose(across, down, rel_tol=_SAME_SHAPE):

@@ -32,8 +32,8 @@ _NEEDED = _POINTS[:7]
 _STORED_COLOUR = "#f5f6f7"  # of players whom the trial has
 _HELP = (
     "Go to the frame where tracking starts. Click each player's torso, midway between hips and shoulders, and the "
-    "joints of the legs, in two cameras or more. A player with only the torso clicked is not tracked, but counts as "
-    "hiding others."
+    "joints of the legs, in two cameras or more. A player with only the torso clicked is not tracked; tracking "
+    "only knows that this body may hide the others."
 )
 
 
@@ -133,9 +133,14 @@ class PlayersPanel(PointsPanel):
                 raise AirborneError(
                     f"click the torso and all points of the legs of {', '.join(missing)} in two cameras"
                 )
+            stay = self.starts.values() if self.frame == self.start_frame else ()
+            if not any(set(self._points(name)) >= set(_NEEDED) for name in files) and not any(
+                start.has_legs for start in stay
+            ):
+                raise AirborneError("nobody would be tracked; click the points of a player's legs too")
             players = {name: {"points_px": file} for name, file in files.items()}
             what = f"{count(len(files), 'player')} set"
-            self.session.edit_trial(lambda text: with_players(text, self.frame, players), what)
+            self.session.edit_trial(lambda text: with_players(text, self.frame, players, keeps_found=True), what)
             ui.notify("the first poses are written into the trial", type="positive")
 
     def show(self) -> None:

@@ -81,7 +81,9 @@ def _run_card(session: Session, folder: Path, found: _Found) -> None:
 def _numbers(summary: dict[str, Any]) -> None:
     with ui.element("table").classes("plain"):
         for key, words in _NUMBERS.items():
-            if isinstance(value := summary.get(key), int | float | str):
+            value = summary.get(key)
+            value = value.get(key) if isinstance(value, dict) else value  # the method is among its settings
+            if isinstance(value, int | float | str):
                 with ui.element("tr"):
                     for tag, text in (
                         ("th", words),

@@ -85,6 +85,8 @@ class _Panel:
             )
             self.says = ui.label().classes("small soft")
             self._show_buttons()
+            if self.ended is not None and self.ended.code not in (0, STOPPED):
+                self._tell(self.ended.complaint(), is_wrong=True)
         self.view = CameraViews(
             self.shown, frame=self.session.frame, overlay=self._overlay, on_frame=self.session.turn_to
         )
@@ -168,7 +170,8 @@ class _Panel:
 
     async def rename(self) -> None:
         """Show the run of another name."""
-        self.n_done, self.says.text = -1, ""
+        self.n_done = -1
+        self._tell("")
         self._show_buttons()
         self.view.set_overlay(self._overlay)
         await self.look()
@@ -217,18 +220,23 @@ class _Panel:
         said = command.progress()
         is_other = said.startswith(("fitting", "drawing")) or (not n_done and said.startswith("looking"))
         stage = said if is_other else describe_progress(n_done, n_frames)
-        self.says.text = f"{stage}, {command.seconds:.0f} s{left}"
+        self._tell(f"{stage}, {command.seconds:.0f} s{left}")
 
     def _say_end(self, command: Command) -> None:
         if command.code == 0:
-            self.says.text = command.output().splitlines()[0]
+            self._tell(command.output().splitlines()[0])
             ui.notify("tracked; the report is in the step Results", type="positive")
         elif command.code == STOPPED:
-            self.says.text = "stopped"
+            self._tell("stopped")
         else:
-            self.says.text = ""
+            self._tell(command.complaint(), is_wrong=True)
             complain(command.complaint())
         self._show_buttons()
+
+    def _tell(self, text: str, *, is_wrong: bool = False) -> None:
+        """Show a line beside the buttons, until there is another."""
+        self.says.text = text
+        self.says.classes("warn" if is_wrong else "soft", remove="soft" if is_wrong else "warn")
 
     def _show_buttons(self) -> None:
         """Show what can be done about the run now."""
@@ -247,6 +255,7 @@ class _Panel:
             except TrialError as error:
                 problem = str(error)
         self.name.set_enabled(not is_running)
+        self.settings.set_enabled(not is_running)
         self.bar.set_visibility(is_running)
         self.halt.set_visibility(is_running)
         self.begin.set_visibility(not is_running and not is_begun)
@@ -254,6 +263,5 @@ class _Panel:
         self.resume.set_visibility(not is_running and is_begun and not is_finished)
         self.again.set_visibility(not is_running and is_begun)
         if problem or self._problem:
-            self.says.text = problem
-            self.says.classes("warn" if problem else "soft", remove="soft" if problem else "warn")
+            self._tell(problem, is_wrong=bool(problem))
         self._problem = problem

@@ -45,6 +45,11 @@ class TrackSettingsBar:
         field.on("clear", lambda: on_text(""), args=[])
         return field
 
+    def set_enabled(self, is_enabled: bool) -> None:
+        """Let nobody change them while a run goes on, whose own they are not."""
+        for field in (self._method, self._first, self._last):
+            field.set_enabled(is_enabled)
+
     def reread(self) -> None:
         """Show what the trial has now; where that has not changed, what is being typed stays."""
         with show_errors():
