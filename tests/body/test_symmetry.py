@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Mesh, Part, Segment
-from airborne.body.model import WHOLE
-from airborne.body.symmetry import continuous_axes, symmetries
+from airborne.body.model import WHOLE, Pose
+from airborne.body.symmetry import continuous_axes, least_turned_pose, symmetries
 from tests.support.tolerances import ROUNDTRIP
 
 YELLOW, BLUE = np.array([231.0, 200.0, 48.0]), np.array([0.0, 0.0, 200.0])
@@ -145,3 +145,17 @@ def test_undetectable_rotation_is_about_the_spheroids_own_axis():
     place = Rotation.from_euler("XYZ", [0.3, 0.4, 0.5])
     (axis,) = continuous_axes(body(part(ellipsoid(0.1, 0.1, 0.3), rotation=place)))
     np.testing.assert_allclose(np.abs(axis @ place.as_matrix()), [0, 0, 1], atol=ROUNDTRIP)
+
+
+@pytest.mark.parametrize("turn_deg", [(0, 0, 170), (80, 10, 0), (5, 100, 0), (-60, 200, 30)])
+def test_of_poses_that_look_alike_the_least_turned_is_taken_whichever_is_found(turn_deg):
+    found = Rotation.from_euler("xyz", turn_deg, degrees=True)
+    alike = [found * Rotation.from_matrix(each) for each in symmetries(cross())]
+    assert len(alike) > 1
+    taken = [
+        least_turned_pose(cross(), Pose(world_from_root=RigidTransform.from_rotation(each))).world_from_root.rotation
+        for each in alike
+    ]
+    for each in taken:
+        assert each.magnitude() == pytest.approx(min(other.magnitude() for other in alike))
+        assert (each.inv() * taken[0]).magnitude() < ROUNDTRIP

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -53,6 +53,19 @@ def symmetries(model: BodyModel) -> list[Array]:
     solids = _solids(model)
     rotations = [R for R in Rotation.create_group("O").as_matrix().round() + 0.0 if _is_same(R, solids)]
     return sorted(rotations, key=lambda R: -float(np.trace(R)))
+
+
+def least_turned_pose(model: BodyModel, pose: Pose) -> Pose:
+    """Return, of the poses that look like one of a body without joints, that turned least from the world's axes.
+
+    So trials of one body agree, wherever its sides cannot be told apart.
+    """
+    if model.has_joints:
+        return pose
+    R = pose.world_from_root.rotation.as_matrix()
+    best = max(symmetries(model), key=lambda symmetry: float(np.trace(R @ symmetry)))
+    root = RigidTransform.from_components(pose.world_from_root.translation, Rotation.from_matrix(R @ best))
+    return replace(pose, world_from_root=root)
 
 
 def continuous_axes(model: BodyModel) -> Array:

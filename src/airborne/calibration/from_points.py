@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -25,7 +25,7 @@ from airborne.calibration.intrinsics.physical import (
     parameter_covariance,
     parameter_names,
 )
-from airborne.calibration.sources.control_points import ControlPoints
+from airborne.calibration.sources.control_points import SURVEYED_SD, ControlPoints
 from airborne.cameras.camera import Rig
 from airborne.cameras.dlt import Decomposition, dlt_coefficients, fit_dlt
 from airborne.errors import CalibrationError
@@ -110,8 +110,15 @@ def calibrate(
     }
     solutions = {name: choose_simplest(each) for name, each in candidates.items()}
     common_sd_m = common_lens_sd(candidates, sizes)
-    cameras = [each.pinhole.camera(name, sizes[name], each.shift_sd_px) for name, each in solutions.items()]
     fits = [_describe_fit(points, name, solutions[name], candidates[name], common_sd_m.get(name)) for name in solutions]
+    cameras = [
+        replace(
+            each.pinhole.camera(fit.name, sizes[fit.name], each.shift_sd_px),
+            covariance=fit.covariance,
+            world_sd=SURVEYED_SD,
+        )
+        for fit, each in zip(fits, solutions.values(), strict=True)
+    ]
     return Calibration(
         rig=Rig(tuple(cameras)),
         method=method,

@@ -12,6 +12,7 @@ from airborne.calibration.cross_validation import cross_validate
 from airborne.calibration.initial.chaining import board_poses, board_source
 from airborne.calibration.initial.resection import Resection, find_misplaced_cameras, resect_cameras
 from airborne.calibration.initial.values import Inputs, read_inputs
+from airborne.calibration.sources.control_points import SURVEYED_SD
 from airborne.calibration.sources.files import Sources
 from airborne.calibration.sources.person import calibration_prior, person_source
 from airborne.calibration.sources.scene_points import scene_source
@@ -73,6 +74,12 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
     if frame.is_unchanged and sources.kinds == ["control_points"]:
         final = _with_lens_model_error(inputs, final)
     held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
+    left_out = np.concatenate(list(held_out_px.values()))
+    worse = np.sqrt(np.mean(left_out[np.isfinite(left_out)] ** 2)) / final.rms_px()  # NaN where nothing is left out
+    rig = _with_wider_errors(final.rig, np.full(len(final.rig), np.fmax(worse, 1.0)))
+    if inputs.points:
+        rig = Rig(tuple(replace(camera, world_sd=SURVEYED_SD) for camera in rig))
+    final = replace(final, rig=rig)
     lags = _lags(final) if lag_sd_s is not None else {}
     return RigCalibration(
         inputs=inputs,
@@ -182,7 +189,17 @@ def _with_lens_model_error(inputs: Inputs, adjustment: Adjustment) -> Adjustment
         fit = inputs.lenses.get(name)
         if fit is not None and fit.place_sd_m is not None:
             row[3:6] = np.maximum(row[3:6], fit.place_sd_m)
-    return replace(adjustment, camera_sd=camera_sd)
+    wider = np.mean(camera_sd[:, 3:6] / np.maximum(adjustment.camera_sd[:, 3:6], 1e-12), axis=1)
+    return replace(adjustment, camera_sd=camera_sd, rig=_with_wider_errors(adjustment.rig, wider))
+
+
+def _with_wider_errors(rig: Rig, factors: Array) -> Rig:
+    """Return the cameras with deviations so many times as large, by camera; none becomes smaller."""
+    cameras = [
+        camera if camera.covariance is None else replace(camera, covariance=max(factor, 1.0) ** 2 * camera.covariance)
+        for camera, factor in zip(rig, factors, strict=True)
+    ]
+    return Rig(tuple(cameras))
 
 
 def _lags(adjustment: Adjustment) -> dict[str, Array]:

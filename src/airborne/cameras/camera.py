@@ -35,6 +35,10 @@ class Camera:
     )  # k1, k2, p1, p2, k3 (, k4, k5, k6); of a fisheye k1 to k4
     lens: Lens = "brown"
     shift_sd_px: float = 0.0  # how far the calibration may displace an image as a whole, right or down [px]
+    # (7, 7) of the calibration's errors: turn [rad] and place [m], both in the camera's axes, and focal length [share];
+    # None: it does not say
+    covariance: Array | None = None
+    world_sd: float | None = None  # of the size of the calibration's world [share]; None: it does not say
 
     @property
     def centre(self) -> Array:
@@ -153,6 +157,16 @@ class Rig:
 
     def __iter__(self) -> Iterator[Camera]:
         return iter(self.cameras)
+
+    @property
+    def states_errors(self) -> bool:
+        """Whether the calibration says of every camera how good it is."""
+        return all(camera.covariance is not None for camera in self.cameras)
+
+    @property
+    def world_sd(self) -> float | None:
+        """Standard deviation of the size of the calibration's world [share]; None where it does not say."""
+        return max((each for camera in self.cameras if (each := camera.world_sd) is not None), default=None)
 
     @property
     def names(self) -> tuple[str, ...]:

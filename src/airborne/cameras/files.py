@@ -182,6 +182,7 @@ def _texts(
     """Return the texts by file name, and what they cannot hold."""
     if kind == "easymocap":
         return easymocap_texts(rig, unit), ()
+    unsaid = ("how well the cameras are known",) if kind != "pose2sim" and rig.states_errors else ()
     write = {
         "pose2sim": lambda: (pose2sim_text(rig, errors_px), ()),
         "aniposelib": lambda: (aniposelib_text(rig, unit), ()),
@@ -192,7 +193,7 @@ def _texts(
         "dlt": lambda: (dlt_text(rig, pixels, unit), dlt_losses(rig)),
     }
     text, notes = write[kind]()
-    return {"": text}, notes
+    return {"": text}, (*notes, *unsaid)
 
 
 def _unit(kind: str, unit: Unit | None) -> Unit:

@@ -157,7 +157,10 @@ def _describe_self_check(summary: dict) -> str | None:
         return "self-check: the scene is never seen without the body, so nothing can be said; track more frames"
     if any(each["is_alarm"] for each in findings):
         return "self-check: something is wrong, see the notes"
-    return "self-check: nothing seems wrong; " + "; ".join(each["sentence"] for each in findings[:2])
+    if not summary["n_tracked"]:
+        return "self-check: no frame is tracked, so it says nothing of body, cameras and times"
+    sizes = "; ".join(each["sentence"] for each in findings[:2])
+    return f"self-check of sizes, cameras and times: nothing seems wrong; {sizes}"
 
 
 def _overlays(output: Path) -> list[Path]:

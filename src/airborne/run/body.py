@@ -232,7 +232,6 @@ class BodyRun:
             self.recording.rig,
             self.start,
             self.kept,
-            self.calibration,
             is_preset=self.trial.body.file is None,
         )
         fitted, timings_s = None, {"self_check": time.monotonic() - begun_s}
@@ -247,7 +246,7 @@ class BodyRun:
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
         self.recording.events.extend(checked.doubts)
-        is_exact = self.calibration is None
+        is_exact = not self.recording.rig.states_errors
         return motion, {
             "name": self.trial.name,
             **headline(motion),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene
 from airborne.body import BodyModel, Pose
-from airborne.body.symmetry import symmetries
+from airborne.body.symmetry import least_turned_pose, symmetries
 from airborne.errors import TrialError, UndecidedError, count
 from airborne.export import write_json
 from airborne.geometry.rotations import angles_from_matrix
@@ -22,7 +22,7 @@ from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
 from airborne.tracking.backward import turn_time
 from airborne.tracking.first_pose.candidates import Candidate, StartSearch, find_thing
-from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, spread_sample
+from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, source_of, spread_sample
 from airborne.tracking.first_pose.person_candidates import find_person
 from airborne.tracking.first_pose.players import PlayersSearch
 from airborne.tracking.methods import sample_body_colours
@@ -78,10 +78,12 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     recording, facts, sample = look_through(trial, progress)
     scenes = empty_scenes(sample)
     if not scenes:
-        n_seen = sum(any(view is not None for view in frames.views) for frames in sample)
-        masked = ", as [[mask]] leaves all cameras out of others" if trial.mask and n_seen < len(sample) else ""
+        pictures = Counter(source_of(view) for frames in sample for view in frames.views if view is not None)
+        kind = " and kind of field" if len(pictures) > len(trial.camera) else ""
+        most = max(pictures.values(), default=0)
+        masked = ", as [[mask]] leaves them out of others" if trial.mask and most < len(sample) else ""
         raise TrialError(
-            f"{trial.name}: {count(n_seen, 'frame')} with images{masked}: too few to tell the empty scene, "
+            f"{trial.name}: {count(most, 'picture')} of each camera{kind}{masked}: too few to tell the empty scene, "
             f"{FEWEST_PICTURES} at least; give the pose under [start]"
         )
     search = find_person if model.has_joints else find_thing
@@ -92,13 +94,14 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
         raise _ask_for_help(trial, model, finding, folder)
     first = finding.candidates[0]
     frame, pose = _track_back(trial, model, recording, finding)
+    pose = least_turned_pose(model, pose)
     chosen = "was found" if take is None else f"is candidate {take}, as --take says"
     note = (
         f"[start] {chosen}: the body stands out best in frame {finding.moment.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     if len(symmetries(model)) > 1:
-        note += "; turned poses of this body look alike, and its angles are those of one of them"
+        note += "; turned poses of this body look alike, and of them this is turned least from the world's axes"
     return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, note)
 
 

@@ -21,6 +21,7 @@ def provenance_of(
 ) -> dict[str, Any]:
     """Return the end of every summary: warnings, events, method, cameras, versions, inputs."""
     exact = _EXACT_CALIBRATION + (_OF_PLAYERS if trial.has_players else _OF_A_BODY)
+    says_enough = recording.rig.states_errors and not trial.has_players
     fits = {} if calibration is None else {fit.name: fit for fit in calibration.fits}
     cameras = [
         {
@@ -33,7 +34,7 @@ def provenance_of(
         for camera in recording.rig
     ]
     return {
-        "warnings": [exact] if calibration is None else list(calibration.warnings),
+        "warnings": list(calibration.warnings) if calibration else [] if says_enough else [exact],
         "events": recording.events,
         "method": trial.track.model_dump(),
         "cameras": cameras,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from airborne.body import BodyModel, Pose
-from airborne.calibration.from_points import Calibration
 from airborne.cameras import Rig
 from airborne.motion import Motion
 from airborne.tracking import Status
@@ -39,7 +38,6 @@ def check_run(
     rig: Rig,
     start: Pose,
     kept: KeptFrames,
-    calibration: Calibration | None,
     *,
     is_preset: bool,
 ) -> CheckedRun:
@@ -50,9 +48,8 @@ def check_run(
     frames = sorted(kept, key=lambda each: each.index)
     poses = [motion.pose(row) for row in rows]
     path = TrackedPath(motion.index[rows], motion.time_s[rows], poses, motion.covariance[rows, :6, :6])
-    calibrated = {} if calibration is None else {fit.name: fit.covariance for fit in calibration.fits}
     body_sd = PRESET_SD if is_preset else MEASURED_SD
-    run = gather_equations(model, rig, path, frames, calibrated=calibrated, body_sd=body_sd)
+    run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
     status, sentences = motion.status.astype(f"<U{max(map(len, Status))}"), []
     for reason, is_doubtful in doubts(model, path, frames, (start, first), found).items():

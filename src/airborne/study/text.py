@@ -91,9 +91,12 @@ def _results(comparison: VariableComparison) -> list[str]:
     typical = (float(np.median(each)) for each in (spread.sd_within, spread.sd_measurement, spread.mdc))
     within, measured, mdc = typical
     where = "" if comparison.axis is None else "median over the curve: "
+    stated = "the runs state none for the measurement"
+    if measured:
+        stated = f"the runs state {measured:.3g} for the measurement, errors included that trials share"
     sentences.append(
-        f"{where}standard deviation of trials of one athlete and condition {within:.3g} (the runs state {measured:.3g} "
-        f"for the measurement, errors included that trials share); minimal detectable change of a trial {mdc:.3g}."
+        f"{where}standard deviation of trials of one athlete and condition {within:.3g} ({stated}); minimal detectable "
+        f"change of a trial {mdc:.3g}."
     )
     return sentences
 

@@ -126,7 +126,7 @@ class _Measure:
     def __init__(self, trial: Trial, start_s: Array, on_image: Callable[[], None]) -> None:
         self._trial, self._start_s, self._on_image = trial, start_s, on_image
         opened = open_trial(trial)
-        self._recording, self._calibration = opened.recording, opened.calibration
+        self._recording = opened.recording
         self._start = find_first_pose(trial, trial.model(), opened.recording.rig, opened.detections).pose
         self._last: _TrackedPath | None = None
         self._appearance_state: RefinedState | None = None  # of the last pass with all cameras
@@ -170,11 +170,9 @@ class _Measure:
         model = last.refined.render_model.model
         if model.has_joints:
             return None
-        calibration = self._calibration
-        calibrated = {} if calibration is None else {fit.name: fit.covariance for fit in calibration.fits}
         n = len(last.poses)
         path = TrackedPath(np.array(last.index), np.array(last.time_s), last.poses, np.zeros((n, 6, 6)))
-        run = gather_equations(model, rig, path, list(last.kept), calibrated=calibrated, body_sd=MEASURED_SD)
+        run = gather_equations(model, rig, path, list(last.kept), body_sd=MEASURED_SD)
         return None if run is None else camera_times(run, rig)
 
     def _with_lags(self, lag_s: Array, drift: Array) -> Recording:

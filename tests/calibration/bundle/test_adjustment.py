@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.stats import chi2
 
 from airborne.calibration.bundle import ALL_FIXED, CameraPrior, FreeParameters, Lengths, ObservationLags, adjust
 from airborne.calibration.initial.chaining import board_source
@@ -115,6 +116,32 @@ def test_errors_lie_within_two_standard_deviations_as_often_as_they_should():
         inside, total = inside + (off < 2).sum(), total + off.size
     share = inside / total  # the numbers of one camera go together: about 100 independent ones
     assert 0.90 < share < 0.99
+
+
+def moved(camera, step):
+    """The camera turned, shifted and zoomed as `Camera.covariance` counts it."""
+    turn = RigidTransform.from_components(-step[3:6], Rotation.from_rotvec(step[:3]))
+    return replace(
+        camera, camera_from_world=turn * camera.camera_from_world, K=camera.K @ np.diag([1 + step[6], 1 + step[6], 1])
+    )
+
+
+@pytest.mark.parametrize("free", [FreeParameters(), FreeParameters(principal_point=True, n_terms=2)])
+def test_images_move_as_the_cameras_covariances_say(free):
+    rig, statistic = ring(3, distortion=np.zeros(5)), []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        points = rng.uniform(-0.8, 0.8, (40, 3)) + MIDDLE
+        found = adjust(rig, [observe_points(rng, rig, points, noise_px=0.5)], free)
+        for camera, true in zip(found.rig, rig, strict=True):
+            px = true.px_from_world(points)
+            steps = 1e-6 * np.eye(7)
+            J = np.stack([(moved(true, each).px_from_world(points) - px).ravel() for each in steps], axis=1) / 1e-6
+            alike = np.linalg.lstsq(J, (camera.px_from_world(points) - px).ravel())[0]
+            statistic.append(alike @ np.linalg.solve(camera.covariance, alike))
+    inside = np.mean(np.array(statistic) < chi2.ppf(0.95, 7))
+    assert 0.85 < inside <= 1
+    assert 4 < np.mean(statistic) < 9  # of 7 numbers
 
 
 def test_each_sources_noise_is_found():

@@ -37,6 +37,36 @@ def test_pose2sim_gives_every_rig_back(tmp_path, rig):
     assert_same(read_rig(tmp_path / "calib.toml"), rig)
 
 
+def test_pose2sim_gives_back_how_well_the_cameras_are_known(tmp_path):
+    covariance = np.cov(np.random.default_rng(3).normal(size=(7, 30)))
+    errors = {"covariance": covariance, "shift_sd_px": 0.25}
+    rig = Rig(
+        tuple(
+            replace(camera, **errors, world_sd=sd)
+            for camera, sd in zip(three_cameras(), (None, 0.002, 0.001), strict=True)
+        )
+    )
+    write_rig(tmp_path / "calib.toml", rig)
+    found = read_rig(tmp_path / "calib.toml")
+    assert found.states_errors and found.world_sd == 0.002
+    for camera in found:
+        np.testing.assert_array_equal(camera.covariance, covariance)
+        assert camera.shift_sd_px == 0.25
+    in_mm = read_rig(tmp_path / "calib.toml", unit="mm")  # only lengths have a unit
+    np.testing.assert_allclose(in_mm.cameras[0].covariance[3:6, 3:6], 1e-6 * covariance[3:6, 3:6])
+    np.testing.assert_array_equal(in_mm.cameras[0].covariance[:3, :3], covariance[:3, :3])
+    text = (tmp_path / "calib.toml").read_text()
+    for wrong, reason in (
+        (text.replace("covariance = [[", "covariance = [[-"), "is no covariance matrix"),
+        (text.replace("shift_sd_px = 0.25", "shift_sd_px = -1.0"), "shift_sd_px = -1"),
+        (text.replace("world_sd = 0.002", "world_sd = 2"), "world_sd = 2"),
+    ):
+        (tmp_path / "wrong.toml").write_text(wrong)
+        with pytest.raises(CalibrationError, match=reason):
+            read_rig(tmp_path / "wrong.toml")
+    assert write_rig(tmp_path / "cams.json", rig, format="caliscope")[-1] == "how well the cameras are known"
+
+
 @FEW
 @given(rigs(*BROWN, "fisheye", most=12).filter(is_told), st.sampled_from(["m", "mm"]))
 def test_aniposelib_gives_every_rig_back_in_either_unit(tmp_path, rig, unit):

@@ -56,7 +56,7 @@ def checked(*, rig=RIG, model=CROSS, late_s=0.0):
     times = np.array([float(each.time_s) for each in frames])
     own = np.tile(np.diag([1e-3] * 3 + [2e-3] * 3) ** 2, (len(frames), 1, 1))
     path = TrackedPath(np.array([each.index for each in frames]), times, poses, own)
-    run = gather_equations(model, rig, path, frames, calibrated={}, body_sd=0.01)
+    run = gather_equations(model, rig, path, frames, body_sd=0.01)
     assert run is not None
     return self_check(run, model, rig, path)
 

@@ -18,7 +18,7 @@ from airborne.calibration.bundle.problem import build_problem, initial_state, ri
 from airborne.calibration.bundle.robust_fit import RobustFit
 from airborne.calibration.bundle.source import CameraPrior, FreeParameters, Source
 from airborne.calibration.bundle.uncertainty import estimate_uncertainty
-from airborne.cameras.camera import Rig
+from airborne.cameras.camera import Camera, Rig
 from airborne.errors import CalibrationError
 from airborne.geometry.descent import Outcome
 from airborne.types import Array, Ints
@@ -93,9 +93,12 @@ def adjust(
     residuals = np.where(problem.is_used[:, None], fit.residual, np.nan)
     rows = [problem.source == i for i in range(len(sources))]
     adjusted = rig_from_state(rig, state)
+    covariances = uncertainty.camera_covariances(problem, fit.jacobian, adjusted)
     cameras = tuple(
-        replace(c, shift_sd_px=float(s))
-        for c, s in zip(adjusted, uncertainty.shift_sd_px(problem, fit.jacobian), strict=True)
+        replace(camera, shift_sd_px=float(shift_px), covariance=covariance)
+        for camera, shift_px, covariance in zip(
+            adjusted, uncertainty.shift_sd_px(problem, fit.jacobian), covariances, strict=True
+        )
     )
     return Adjustment(
         rig=Rig(cameras),
@@ -129,10 +132,12 @@ def _is_noise_known(sources: Sequence[Source]) -> NDArray[np.bool_]:
     return np.array([source.sd_is_known for source in sources], bool)
 
 
-def _transform_camera(camera, new_from_old: RigidTransform, scale: float):
+def _transform_camera(camera: Camera, new_from_old: RigidTransform, scale: float) -> Camera:
     old = camera.camera_from_world
     scaled = RigidTransform.from_components(old.translation * scale, old.rotation)
-    return replace(camera, camera_from_world=scaled * new_from_old.inv())
+    sizes = np.array([1, 1, 1, scale, scale, scale, 1.0])
+    covariance = None if camera.covariance is None else camera.covariance * np.outer(sizes, sizes)
+    return replace(camera, camera_from_world=scaled * new_from_old.inv(), covariance=covariance)
 
 
 def _transform_source(source: Source, new_from_old: RigidTransform, scale: float) -> Source:

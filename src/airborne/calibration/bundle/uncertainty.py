@@ -12,10 +12,12 @@ from airborne.calibration.bundle.equations import Jacobian, NormalEquations, cam
 from airborne.calibration.bundle.layout import Layout
 from airborne.calibration.bundle.loss import Loss, loss_constants
 from airborne.calibration.bundle.problem import Problem, State
+from airborne.cameras.camera import Rig
 from airborne.types import Array
 
 _MOST_ROWS_AT_ONCE = 200  # rows whose leverage is computed together
 _FEWEST_CLUSTERS = 8  # fewer do not estimate a covariance
+_N_POSE_AND_FOCAL = 7  # the first of `lenses.CAMERA_PARAMETERS`: turn, place and focal length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +46,30 @@ class Uncertainty:
             variance = np.sum(rows @ covariance[np.ix_(columns, columns)] * rows, axis=-1)
             shifts.append(np.sqrt(max(variance.mean(), 0.0)) if variance.size else 0.0)
         return np.array(shifts)
+
+    def camera_covariances(self, problem: Problem, jacobian: Jacobian, rig: Rig) -> list[Array | None]:
+        """Return what `Camera.covariance` holds, by camera; None without observations.
+
+        What the lens's other parameters leave open counts by how it moves the observations: as the turn, place and
+        focal length that move them most alike, in the sense of least squares.
+        """
+        layout = problem.layout
+        found: list[Array | None] = []
+        for i, (camera, columns) in enumerate(zip(rig, layout.cameras, strict=True)):
+            rows = jacobian.by_camera[problem.is_used & (problem.camera == i)][:, :, columns >= 0]
+            if not rows.size:
+                found.append(np.zeros((7, 7)) if len(self.covariance) and not (columns >= 0).any() else None)
+                continue
+            parameters, free = layout.parameters[columns >= 0], columns[columns >= 0]
+            rows, kept = rows.reshape(-1, len(free)), np.flatnonzero(parameters < _N_POSE_AND_FOCAL)
+            size = np.maximum(np.linalg.norm(rows[:, kept], axis=0), 1e-12)
+            scaled = rows[:, kept] / size
+            moves = np.zeros((7, len(free)))
+            moves[parameters[kept]] = np.linalg.pinv(scaled.T @ scaled) @ (scaled.T @ rows) / size[:, None]
+            moves[3:6] = camera.camera_from_world.rotation.as_matrix() @ moves[3:6]
+            moves[6] /= camera.K[0, 0]
+            found.append(moves @ self.covariance[np.ix_(free, free)] @ moves.T)
+        return found
 
 
 def gauge_fixed_inverse(reduced: Array, gauge: Array) -> Array:

@@ -98,7 +98,7 @@ def resect(camera: Camera, points: Array, px: Array) -> Resection:
         (_fit_pose(pinhole, initial, xyz=xyz, uv=uv, weights=weights) for initial in initial_poses),
         key=lambda fit: fit[0],
     )[1:]
-    resected = replace(camera, camera_from_world=pose)
+    resected = replace(camera, camera_from_world=pose, covariance=None)
     residual = np.where(is_valid[..., None], px - resected.px_from_world(points), np.nan)
     systematic_px = _systematic_error_px(residual)
     information = np.einsum("nij,n,nik->jk", jacobian, weights, jacobian) / systematic_px**2

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from airborne.cameras.camera import Rig
 from airborne.cameras.formats.options import FileOptions
-from airborne.cameras.formats.toml import camera_from_table, has_fifth_term, table_lines, toml_key, toml_value
+from airborne.cameras.formats.toml import (
+    camera_from_table,
+    errors_from_table,
+    errors_lines,
+    has_fifth_term,
+    table_lines,
+    toml_key,
+    toml_value,
+)
 from airborne.errors import CalibrationError
 from airborne.io.text import list_keys
 
@@ -27,16 +36,19 @@ def rig_from_tables(document: dict, where: str, options: FileOptions) -> Rig:
             "expected a table such as [cam1] with matrix, rotation, ..."
         )
     metres = options.metres("m")
-    return Rig(
-        tuple(
-            camera_from_table(f"{where}, [{key[:60]}]", str(table.get("name", key)), table, metres)
-            for key, table in tables.items()
-        )
-    )
+    cameras = []
+    for key, table in tables.items():
+        there = f"{where}, [{key[:60]}]"
+        camera = camera_from_table(there, str(table.get("name", key)), table, metres)
+        cameras.append(replace(camera, **errors_from_table(there, table, metres)))
+    return Rig(tuple(cameras))
 
 
 def pose2sim_text(rig: Rig, errors_px: Mapping[str, float] | None = None) -> str:
-    """Return a Pose2Sim file: a fifth distortion term only where there is one, real errors or none."""
+    """Return a Pose2Sim file: a fifth distortion term only where there is one, real errors or none, and deviations.
+
+    Pose2Sim passes over what it does not know: `covariance` and `shift_sd_px`, see `Camera`.
+    """
     lines = []
     for camera in rig:
         lines += [
@@ -45,6 +57,7 @@ def pose2sim_text(rig: Rig, errors_px: Mapping[str, float] | None = None) -> str
             f"size = {toml_value([float(length) for length in camera.size])}",
             *table_lines(camera, n_terms=5 if has_fifth_term(camera) else 4),
             *([f"error = {float(errors_px[camera.name])!r}"] if errors_px else []),
+            *errors_lines(camera),
             "",
         ]
     lines += ["[metadata]", "adjusted = false"]

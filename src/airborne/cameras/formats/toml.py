@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from typing import Any
 
 import numpy as np
 
 from airborne.cameras.camera import Camera
 from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, parse_size
+from airborne.errors import CalibrationError
 
 _ROTATION_SHAPES = ((3,), (3, 3))  # a rotation vector or a matrix
+_ROUNDING = 1e-6  # of a covariance's eigenvalues, over the variances
 _TERM_SHAPES = {False: ((4,), (5,), (8,)), True: ((4,),)}  # by whether the lens is a fisheye
 
 
@@ -30,6 +33,39 @@ def camera_from_table(where: str, name: str, table: dict, metres: float) -> Came
         distortion=parse_array(where, "distortions", terms, *_TERM_SHAPES[is_fisheye]),
         is_fisheye=is_fisheye,
     )
+
+
+def errors_from_table(where: str, table: dict, metres: float) -> dict[str, Any]:
+    """Return what a table says of a camera's errors, as `Camera` has it; nothing of one that says nothing.
+
+    Raises CalibrationError for a matrix that is no covariance.
+    """
+    if "covariance" not in table:
+        return {}
+    sizes = np.array([1, 1, 1, metres, metres, metres, 1.0])
+    covariance = parse_array(where, "covariance", table["covariance"], (7, 7)) * np.outer(sizes, sizes)
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    values = np.linalg.eigvalsh((covariance + covariance.T) / 2 / sd[:, None] / sd)
+    if not np.allclose(covariance, covariance.T, rtol=1e-6, atol=1e-12) or values[0] < -_ROUNDING:
+        raise CalibrationError(f"{where}: covariance is no covariance matrix; leave it out")
+    shift_px = float(parse_array(where, "shift_sd_px", table.get("shift_sd_px", 0.0), ()))
+    if shift_px < 0:
+        raise CalibrationError(f"{where}: shift_sd_px = {shift_px:g}, expected 0 or more")
+    world_sd = table.get("world_sd")
+    if world_sd is not None and not (isinstance(world_sd, float) and 0 < world_sd < 1):
+        raise CalibrationError(f"{where}: world_sd = {world_sd}, expected a share between 0 and 1")
+    return {"covariance": covariance, "shift_sd_px": shift_px, "world_sd": world_sd}
+
+
+def errors_lines(camera: Camera) -> list[str]:
+    """Return the lines that `errors_from_table` reads, none where the calibration says nothing of its errors."""
+    if camera.covariance is None:
+        return []
+    return [
+        f"covariance = {toml_value(camera.covariance.tolist())}",
+        f"shift_sd_px = {float(camera.shift_sd_px)!r}",
+        *([] if camera.world_sd is None else [f"world_sd = {float(camera.world_sd)!r}"]),
+    ]
 
 
 def table_lines(camera: Camera, *, n_terms: int, metres: float = 1.0) -> list[str]:

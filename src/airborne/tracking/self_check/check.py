@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -142,12 +142,11 @@ def gather_equations(
     path: TrackedPath,
     kept: Sequence[Frames],
     *,
-    calibrated: Mapping[str, Array],
     body_sd: float,
 ) -> RunEquations | None:
     """Look at some frames of a run again; None where none of them shows the body.
 
-    calibrated, body_sd: as `prior_covariance` takes them.
+    body_sd: as `prior_covariance` takes it.
     """
     seen = [(row, frames) for frames in kept if (row := path.row(frames.index)) is not None]
     if not seen:
@@ -159,7 +158,7 @@ def gather_equations(
     if not is_drawn.any():
         return None
     evidence, rows = evidence.select(is_drawn), list(np.array(rows)[is_drawn])
-    prior = prior_covariance(rig, calibrated, body_sd, is_person=model.has_joints)
+    prior = prior_covariance(rig, body_sd, is_person=model.has_joints)
     wide = prior
     for nuisance in nuisances_of(rig):
         wide = widen(wide, nuisance)

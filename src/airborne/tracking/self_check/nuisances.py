@@ -23,7 +23,7 @@ _KINDS_OF_CAMERA: tuple[tuple[Kind, int], ...] = (("turn_deg", 3), ("shift_m", 3
 _PER_CAMERA = 8  # numbers of the kinds above
 # sds of what is usual: of a body measured or fitted, of one by its stature alone, of a world, of other cameras
 MEASURED_SD, PRESET_SD = 0.01, 0.03  # shares of the size
-_SURVEYED_SD, _WORLD_SD = 0.002, 0.01  # of a world of control points, of any other
+_WORLD_SD = 0.01  # of a world whose calibration does not say how large it is
 _CAMERA_SD: Mapping[Kind, float] = {"turn_deg": np.radians(0.1), "shift_m": 0.01, "focal": 0.005, "time_s": 0.002}
 # sds of what is possible where something is wrong [share, rad, m, share, s]
 _GROSS_SD: Mapping[Kind, float] = {
@@ -117,27 +117,29 @@ def _camera_twists(camera: Camera, root: Array, velocity: Array) -> Array:
     return columns
 
 
-def prior_covariance(rig: Rig, calibrated: Mapping[str, Array], body_sd: float, *, is_person: bool) -> Array:
+def prior_covariance(rig: Rig, body_sd: float, *, is_person: bool) -> Array:
     """Return the covariance (n_parameters, n_parameters) of what is usual; it may be singular.
 
-    calibrated: of the cameras that the calibration knows, the covariance (7, 7) of turn, place [in camera axes] and
-    focal length [share]. Where it knows none, the cameras' common motion counts for nothing: poses are in their world.
-    That goes for the place of its origin, too.
+    Of cameras that say how well they are known, that counts. A world whose size is known, of control points, lies where
+    they say; any other may be larger about the cameras' middle. Where not all cameras say anything, their common
+    motion counts for nothing there: poses are in their world. That goes for the place of its origin, too.
     """
     covariance = np.zeros((n_parameters(rig),) * 2)
-    covariance[0, 0], covariance[1, 1] = body_sd**2, (_SURVEYED_SD if calibrated else _WORLD_SD) ** 2
+    covariance[0, 0], covariance[1, 1] = body_sd**2, (rig.world_sd or _WORLD_SD) ** 2
     usual = np.repeat([_CAMERA_SD[kind] for kind, _ in _KINDS_OF_CAMERA], [n for _, n in _KINDS_OF_CAMERA])
     for i, camera in enumerate(rig):
         block = slice(2 + _PER_CAMERA * i, 2 + _PER_CAMERA * (i + 1))
         covariance[block, block] = np.diag(usual**2)
-        if camera.name in calibrated:
+        if camera.covariance is not None and (rig.world_sd is not None or rig.states_errors):
             known = slice(block.start, block.start + 7)
-            covariance[known, known] = calibrated[camera.name]
+            covariance[known, known] = camera.covariance
     bias = np.arange(first_bias(rig), len(covariance))
     covariance[bias, bias] = np.tile((_PERSON_BIAS_SD if is_person else _BIAS_SD) ** 2, len(rig))
     times = np.arange(len(rig)) * _PER_CAMERA + 9
     covariance[np.ix_(times, times)] -= _CAMERA_SD["time_s"] ** 2 / len(rig)  # the clock is theirs together
-    return covariance if calibrated else _about_middle(_without_common_motion(covariance, rig), rig)
+    if rig.world_sd is not None:
+        return covariance
+    return _about_middle(covariance if rig.states_errors else _without_common_motion(covariance, rig), rig)
 
 
 def widen(prior: Array, nuisance: Nuisance) -> Array:
