@@ -128,7 +128,11 @@ def test_the_study_holds_no_outputs():
     ("mistake", "said"),
     [
         (lambda: ab.synthesise("banana", "p"), "scene 'banana' is not known; choose cross or somersault or block"),
+        (lambda: ab.synthesise("cross", "p", sed=3), "synthesise has no option sed; it has: preset"),
         (lambda: ab.smooth("results", "butterwort"), "choose butterworth or spline or kalman"),
+        (lambda: ab.smooth("results", "butterworth", cutoff_hz="auto"), "cutoff_hz is 'auto'; expected Hz, or None"),
+        (lambda: ab.track(ab.example_trial("thrown_cross"), "trial.toml"), "trial.toml is a file; give a folder"),
+        (lambda: ab.example_trial("thrown_cros"), "there is no example 'thrown_cros'; there are: thrown_cross"),
         (lambda: ab.read_run("results").plot("banana"), "choose pose or joints or joint_status or flight"),
         (lambda: ab.Trial(name="x", camera=[]), "Trial: camera: holds 0 values, expected 1"),
         (lambda: ab.read_rig("calib.toml")["cam1"].px_from_world([0, 1]), "expected (..., 3)"),

@@ -57,7 +57,7 @@ def test_a_tables_columns_are_labels_over_those_of_the_file(tmp_path):
         ("trial,status\nx,good\n", "a label is called status"),
         ("trial,\nx,good\n", "a name has 1 to 80 characters"),
         (f"trial,{'a' * 90}\nx,good\n", "a name has 1 to 80 characters"),
-        ("trial\n.x\n", "begins with no dot"),
+        ("trial\n.x\n", "nor begin with a dot"),
         ("trial\na\x1b[31m\n", "no control character"),
     ],
 )

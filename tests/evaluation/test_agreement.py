@@ -132,4 +132,4 @@ def test_a_table_says_of_how_many_moments_it_is_and_where_they_are_few():
     rng = np.random.default_rng(8)
     few, many = (agreement_table([analyse_agreement(series(rng.normal(size=n)))]) for n in (3, 300))
     assert [text.splitlines()[1].split()[2] for text in (few, many)] == ["3", "300"]
-    assert "few moments: these numbers are rough" in few and "few" not in many
+    assert "few frames: these numbers are rough" in few and "few" not in many

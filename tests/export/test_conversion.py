@@ -162,7 +162,7 @@ def test_detections_go_to_openpose_and_back(tmp_path, shared_data, airborne):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("calib.toml", "x.txt"), "the name names no format"),
+        (("calib.toml", "x.txt"), "the file name does not tell the format"),
         (("calib.toml", "x.toml", "--origin", "lower-left"), "--origin does not apply to a pose2sim file to read"),
         (("calib.toml", "x.toml", "--to-unit", "mm"), "--to-unit does not apply to a pose2sim file to write"),
         (("calib.toml", "x.npz", "--to", "npz"), "holds cameras, which cannot be written as npz"),

@@ -57,8 +57,8 @@ def test_joints_that_cannot_be_trusted_are_warned_of_with_the_worst():
     good = {"tracked": 9, "uncertain": 1, "unknown": 0, "lost": 0}
     bad = {"tracked": 2, "uncertain": 3, "unknown": 5, "lost": 0}
     (warning,) = joint_warnings({"hip": good, "foot": bad})
-    counts = "20 joint positions: 11 tracked, 4 uncertain, 5 unknown, 0 lost; fewest of foot, tracked in 2 of 10 frames"
-    assert warning.startswith(counts)
+    counts = "20 joint positions: 11 tracked, 4 uncertain, 5 unknown, 0 lost"
+    assert warning.startswith(f"{counts}; the fewest tracked are those of foot, 2 of 10 frames")
     assert list(joint_warnings({"hip": {"tracked": 10, "uncertain": 0, "unknown": 0, "lost": 0}})) == []
     assert list(joint_warnings({})) == []
 

@@ -174,7 +174,7 @@ def test_the_first_frame_is_drawn_and_then_replaced_by_the_whole_run(folder, tmp
     assert drawn <= set(files_of(out))
     assert not (out / "report.html").exists() and not (out / "videos").exists()
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(ResultError, match="--overwrite to replace it"):
+    with pytest.raises(ResultError, match="overwrite it"):
         track_trial(trial, out, pictures=False)
     assert track_trial(trial, out, overwrite=True, pictures=False).summary["n_frames"] == 2
     assert not drawn & set(files_of(out))

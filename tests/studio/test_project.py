@@ -149,10 +149,10 @@ def test_a_run_is_no_file_and_the_next_one_has_a_free_name(tmp_path):
     ("table", "says"),
     [
         ({}, "No body is chosen yet."),
-        ({"file": "cross.toml"}, "The body in force: cross.toml"),
-        ({"preset": "legs"}, "The body in force: players"),
-        ({"preset": "human18", "stature_m": 1.74, "mass_kg": 70.0}, "The body in force: a person, 1.74 m, 70.0 kg"),
-        ({"measurements": "anna.txt"}, "The body in force: a person as measured in anna.txt"),
+        ({"file": "cross.toml"}, "The body now: cross.toml"),
+        ({"preset": "legs"}, "The body now: players"),
+        ({"preset": "human18", "stature_m": 1.74, "mass_kg": 70.0}, "The body now: a person, 1.74 m, 70.0 kg"),
+        ({"measurements": "anna.txt"}, "The body now: a person as measured in anna.txt"),
     ],
 )
 def test_the_body_in_force_is_named(table, says):

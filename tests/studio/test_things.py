@@ -78,7 +78,7 @@ def test_a_solid_takes_the_colour_that_is_clicked_in_a_picture(tmp_path):
         User(page).press("Use this thing")
         page.get_by_text("the body is written into the trial").wait_for()
         User(page).go("Body")
-        page.get_by_text("The body in force: thing.toml").wait_for()
+        page.get_by_text("The body now: thing.toml").wait_for()
         page.wait_for_function("document.querySelector('canvas.view')?.view?.nowItems().length >= 3")  # its first pose
     (solid,) = parse_thing((folder / "thing.toml").read_text(), "thing.toml")[1]
     assert (solid.size_mm, read_toml(folder / "trial.toml")["body"]["file"]) == ((100.0, 900.0, 100.0), "thing.toml")

@@ -165,7 +165,7 @@ def test_the_thrown_cross_from_videos_to_report(folder):
         page.get_by_role("button", name="Use this pose").wait_for(timeout=10 * MINUTE)
         page.get_by_text("Not yet used: press Use this pose.").wait_for()
         page.get_by_role("button", name="Fit it to the pictures").click()  # aside: not on the way
-        page.get_by_text("The pose before is pink.", exact=False).wait_for(timeout=2 * MINUTE)
+        page.get_by_text("The pose before it is drawn in pink.", exact=False).wait_for(timeout=2 * MINUTE)
         user.press("Use this pose")
         page.get_by_text("The trial begins with this pose.").wait_for()
         page.get_by_text("frame 0", exact=True).wait_for()

@@ -364,7 +364,7 @@ def test_saved_pixels_go_with_a_calibration_file_only(folder):
         ('video = "cam1.mp4"', 'video = ""', "camera 'cam1': video: a file's name is empty; give the file's path"),
         ('video = "cam1.mp4"', f'video = "{"a" * 300}"', "camera 'cam1': video: a file's name has at most 255 bytes"),
         ('video = "cam1.mp4"', 'video = "a\\u0000b"', "camera 'cam1': video: a path holds no control character"),
-        ('name = "cam1"', 'name = "../cam1"', "name: a name holds no slash"),
+        ('name = "cam1"', 'name = "../cam1"', "name: a name must not hold a slash"),
         ('name = "cam1"', f'name = "{"a" * 81}"', "name: a name has 1 to 80 characters"),
         ("frame = 0", "frame = 9", "track.stop = 3 leaves no frame, as start.frame = 9"),
     ],

@@ -169,7 +169,7 @@ def test_other_field_orders_than_the_files_flags_are_an_event_not_an_error(tmp_p
     assert trial.events == ["cam1: read as top-first, though the file's flags say progressive"]
     assert len(list(trial)) == 8
     combs = (
-        "read as progressive, though the file's flags say bottom-first; if edges that move are combs, write fields ="
+        "read as progressive, though the file's flags say bottom-first; if moving edges look like combs, write fields ="
     )
     order = replace(trial.facts[0], fields="progressive", flagged_order="bottom-first")
     assert f'cam1: {combs} "bottom-first"' in list(_notes(trial.sources, (order,)))

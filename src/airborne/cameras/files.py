@@ -173,7 +173,9 @@ def format_of_name(path: Path) -> str:
     for suffix, kind in _SUFFIXES.items():
         if path.name.lower().endswith(suffix):
             return kind
-    raise CalibrationError(f"{path}: the name names no format; end it in {', '.join(_SUFFIXES)}, or give --to")
+    raise CalibrationError(
+        f"{path}: the file name does not tell the format; end it in {', '.join(_SUFFIXES)}, or name the format (--to)"
+    )
 
 
 def _texts(

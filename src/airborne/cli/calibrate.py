@@ -80,7 +80,9 @@ def calibrate_command(
         _from_sources(sources, output, report or output.with_name(f"{output.stem}_report"), as_json)
         return
     if board is None and files[0].suffix.lower() not in (*_TABLES, ".toml"):
-        raise AirborneError(f"{files[0]} is no table and no file of sources; videos and images need --board or --wand")
+        raise AirborneError(
+            f"{files[0]} is neither a table nor a file of sources; videos and images need --board or --wand"
+        )
     if is_table:
         if report is not None:
             raise AirborneError("--report goes with sources; the result of a table of control points alone is printed")

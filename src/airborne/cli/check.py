@@ -32,7 +32,7 @@ def check_command(
         for line in checks.mistakes:
             errors.print(f"airborne: {line}", style="red", markup=False)
         if checks.mistakes and checks.well:
-            errors.print("what depends on these is checked once they are mended", style="dim")
+            errors.print("the other checks run once these are mended", style="dim")
         elif not checks.mistakes:
             print("no mistakes: ready to be tracked")
     if checks.mistakes:

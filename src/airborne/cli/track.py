@@ -192,7 +192,7 @@ def _describe(summary: dict, output: Path) -> str:
         lines.append(f"the body was found in no frame: {look}correct [start]")
     else:
         if not summary["n_tracked"]:
-            lines.append(f"no frame is tracked, so that no number here can be relied on: {look}see the notes")
+            lines.append(f"no frame was tracked, so none of these numbers can be relied on: {look}see the notes")
         else:
             position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
             lines.append(

@@ -39,7 +39,7 @@ def agreement_table(rows: Sequence[Agreement]) -> str:
         table.append((name, str(row.n), *errors, share, icc, _number(row.sem.value)))
     lines = align_columns(table, (16, 6, 9, 19, 9, 8, 10, 9))
     if rows and min(row.n for row in rows) < _FEW:
-        lines.append("  few moments: these numbers are rough; agreement.csv holds the 95 % interval of each")
+        lines.append("  few frames: these numbers are rough; agreement.csv holds the 95 % interval of each")
     return "\n".join(lines)
 
 

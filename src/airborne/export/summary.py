@@ -97,8 +97,8 @@ def joint_warnings(statuses: Mapping[str, Mapping[str, int]]) -> Iterator[str]:
         n_tracked, n_frames = statuses[worst][JointStatus.TRACKED], sum(statuses[worst].values())
         counts = ", ".join(f"{n} {status}" for status, n in sums.items())
         yield (
-            f"{count(total, 'joint position')}: {counts}; fewest of {worst}, tracked in {n_tracked} of {n_frames} "
-            "frames; joints.csv has the status of each"
+            f"{count(total, 'joint position')}: {counts}; the fewest tracked are those of {worst}, {n_tracked} of "
+            f"{n_frames} frames; joints.csv has the status of each"
         )
 
 

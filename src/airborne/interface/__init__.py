@@ -6,8 +6,9 @@ several stages with the name of the stage before them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from inspect import signature
 from numbers import Integral
 from os import PathLike
 from pathlib import Path
@@ -196,6 +197,8 @@ def smooth(
     """
     method = method or ("kalman" if cutoff_hz is None else "butterworth")
     require_choice(method, _SMOOTHINGS, "method")
+    if not isinstance(cutoff_hz, float | int | None):
+        raise AirborneError(f"cutoff_hz is {cutoff_hz!r}; expected Hz, or None for that of the residual analysis")
     settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
     out = None if output is None else Path(output)
     with _reporting(progress, "smoothing") as report:
@@ -239,11 +242,20 @@ def synthesise(
     folder = Path(folder)
     with _reporting(progress, "rendering") as report:
         if scene == "block":
+            _check_options(block_scene, options)
             write_block(folder, block_scene(seed, **options), progress=report)
         else:
             write = write_thrown_cross if scene == "cross" else write_somersault
+            _check_options(write, options)
             write(folder, seed=seed, progress=report, **options)
     return folder / "trial.toml"
+
+
+def _check_options(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
+    """Raise AirborneError for an option that a function does not have."""
+    names = [name for name in signature(function).parameters if name not in ("folder", "seed", "progress")]
+    if unknown := [name for name in options if name not in names]:
+        raise AirborneError(f"synthesise has no option {', '.join(unknown)}; it has: {', '.join(names)}")
 
 
 def _folder(run: Run | FilePath) -> Path:

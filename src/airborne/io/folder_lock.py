@@ -82,7 +82,10 @@ def _lock(folder: Path) -> int:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except FileExistsError as error:
-            if error.filename != str(folder) or _is_no_folder(folder):
+            if _is_no_folder(folder):
+                what = "a broken link" if folder.is_symlink() else "a file"
+                raise ResultError(f"{folder} is {what}; give a folder") from None
+            if error.filename != str(folder):
                 raise
             continue  # its last holder has removed the folder while it was looked at
         try:

@@ -17,7 +17,9 @@ def check_name(name: str) -> str:
     if not 1 <= len(name) <= _LONGEST_NAME:
         raise ValueError(f"a name has 1 to {_LONGEST_NAME} characters; rename {_quote(name)}")
     if set(name) & set("/\\") or name.startswith(".") or not name.isprintable() or name.isspace():
-        raise ValueError(f"a name holds no slash, no control character and begins with no dot; rename {_quote(name)}")
+        raise ValueError(
+            f"a name must not hold a slash or a control character, nor begin with a dot; rename {_quote(name)}"
+        )
     return name
 
 

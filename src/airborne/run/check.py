@@ -155,7 +155,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             with start_foregrounds(recording) as foregrounds:
                 checks.attempt(
                     lambda: refuse_mix_ups(recording.rig, foregrounds, model, first.pose),
-                    lambda _: "videos: nothing says that some are other cameras'",
+                    lambda _: "videos: no sign that cameras' videos were exchanged",
                 )
     for event in recording.events:
         checks.add(f"note: {event}")

@@ -12,7 +12,7 @@ from airborne.trial.file import Trial
 from airborne.video import LiveRecording, Recording
 
 _EXACT_CALIBRATION = "the calibration comes from a file that does not say how good it is; "
-_OF_A_BODY = "the standard deviations of poses take what is usual, 0.1°, 10 mm and 0.5 % of the focal length"
+_OF_A_BODY = "the standard deviations of poses count with usual errors: 0.1°, 10 mm and 0.5 % of the focal length"
 _OF_PLAYERS = "the standard deviations of joints leave its errors out"
 
 

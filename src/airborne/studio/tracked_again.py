@@ -105,7 +105,7 @@ def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[st
         if pose is None:
             told.append((np.inf, f"frame {key.frame} is now lost: {_LOST}"))
             continue
-        doubt = "" if status == Status.TRACKED.value else f", {status}"
+        doubt = "" if status == Status.TRACKED.value else f", which is {status},"
         own = key.model_copy(update={"detections": None})  # what was set by hand
         is_by_hand = key.model_fields_set & (BY_HAND | {"joints_m", "points_px"})
         far = _farthest(read_key(trial, own, model, rig=rig, facts=()), pose, rig) if is_by_hand else None
@@ -125,7 +125,11 @@ class _Miss(NamedTuple):
     @property
     def advice(self) -> str:
         """What to do where it is too far for chance."""
-        return ", as the pictures say otherwise: correct it in another camera too" if self.sds > _FAR_SDS else ""
+        return (
+            ", as the pictures say otherwise: correct it in another camera too, or remove it"
+            if self.sds > _FAR_SDS
+            else ""
+        )
 
 
 def _farthest(key: PoseEvidence, pose: Pose, rig: Rig) -> _Miss:

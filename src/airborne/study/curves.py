@@ -60,7 +60,7 @@ def read_curve(trial: StudyTrial, variable: str) -> RunCurve:
     listed = list_curves(trial)
     if variable in listed:  # of players, and none of them is this athlete
         raise ResultError(f"{trial.name}: its run has no player '{trial.athlete}'; name players as their athletes")
-    raise ResultError(f"{trial.name}: its run has no {variable}; it has: {', '.join(listed[:40])}")
+    raise ResultError(f"{trial.name}: its run has no variable '{variable}'; it has: {', '.join(listed[:40])}")
 
 
 def list_curves(trial: StudyTrial) -> list[str]:

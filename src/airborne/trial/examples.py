@@ -11,8 +11,11 @@ _FOLDERS = (_PACKAGE / "example_trials", _PACKAGE.parents[1] / "examples")
 
 
 def example_trial(name: str) -> Path:
-    """Return the trial file of a bundled example; raises TrialError where it was not installed."""
+    """Return the trial file of a bundled example; raises TrialError for another name, or where it was not installed."""
     for folder in _FOLDERS:
         if (folder / name / "trial.toml").is_file():
             return folder / name / "trial.toml"
-    raise TrialError(f"the example '{name}' is not installed; install Airborne from its repository or its wheel")
+    names = sorted({path.parent.name for folder in _FOLDERS for path in folder.glob("*/trial.toml")})
+    if names:
+        raise TrialError(f"there is no example '{name}'; there are: {', '.join(names)}")
+    raise TrialError("the examples are not installed; install Airborne from its repository or its wheel")

@@ -223,7 +223,7 @@ def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Itera
         if source.fields == "auto":
             yield f"{source.name}: the file's flags say {fact.flagged_order}"
         elif fact.flagged_order != fact.fields:
-            advice = f'; if edges that move are combs, write fields = "{fact.flagged_order}"'
+            advice = f'; if moving edges look like combs, write fields = "{fact.flagged_order}"'
             is_whole = fact.fields == "progressive"
             yield (
                 f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged_order}"

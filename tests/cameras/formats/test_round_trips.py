@@ -152,7 +152,7 @@ def test_what_a_format_loses_is_said(tmp_path):
 
 def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
     for name in ("a\nb", "../a", ".a", "", "a" * 81):
-        with pytest.raises(CalibrationError, match="cameras: a name h"):
+        with pytest.raises(CalibrationError, match=r"cameras: a name (has|must)"):
             Rig((replace(three_cameras()["left"], name=name),))
     spaced = Rig((replace(three_cameras()["left"], name="a b"),))
     with pytest.raises(CalibrationError, match="cannot be a key of OpenCV's YAML"):
@@ -162,7 +162,7 @@ def test_a_name_that_no_file_can_hold_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("rig.txt", {}, "the name names no format; end it in .toml, .qca.txt, .xcp"),
+        ("rig.txt", {}, "the file name does not tell the format; end it in .toml, .qca.txt, .xcp"),
         ("rig.toml", {"format": "anipose"}, "no calibration format 'anipose'; choose from pose2sim, aniposelib"),
         ("rig.toml", {"unit": "mm"}, "pose2sim files are always in m"),
         ("rig.xcp", {"unit": "m"}, "vicon files are always in mm"),

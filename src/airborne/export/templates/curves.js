@@ -35,7 +35,7 @@ export function drawCurves(canvas, data, now) {
   const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${data.status[row]}${namesOf(data, row)}`;
   pen.fillStyle = "#5d666f";
   pen.font = FONT;
-  pen.fillText(`frame ${now}${time}${data.is_provisional ? "   ± not final: it grows when the run ends" : ""}`, LEFT, box.height - 4);
+  pen.fillText(`frame ${now}${time}${data.is_provisional ? "   ± is not final: it grows when the run ends" : ""}`, LEFT, box.height - 4);
   drawLegend(pen, data.series, data.series.map((each) => valueAt(each, data, now)), canvas);
 }
 

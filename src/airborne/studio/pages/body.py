@@ -160,13 +160,13 @@ def describe_body(table: Mapping[str, Any]) -> str:
     """Say which body a trial has, as its table [body] gives it."""
     preset, file, measured = (table.get(key) for key in ("preset", "file", "measurements"))
     if file:
-        return f"The body in force: {file}"
+        return f"The body now: {file}"
     if measured:
-        return f"The body in force: a person as measured in {measured}"
+        return f"The body now: a person as measured in {measured}"
     if preset == "legs":
-        return "The body in force: players"
+        return "The body now: players"
     if preset:
-        return f"The body in force: a person, {table.get('stature_m', '?')} m, {table.get('mass_kg', '?')} kg"
+        return f"The body now: a person, {table.get('stature_m', '?')} m, {table.get('mass_kg', '?')} kg"
     return "No body is chosen yet."
 
 

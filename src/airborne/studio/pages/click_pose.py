@@ -40,7 +40,7 @@ from airborne.studio.view import Drag, Mark
 _NEEDED = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")
 _HELP = (
     "Choose a landmark and click it in two cameras or more: a click draws, in the others, the curve on which it lies, "
-    "give or take two deviations."
+    "within two standard deviations."
 )
 _NEEDED_OF_PERSON = "Both hips and both shoulders are needed."
 _NEEDED_OF_THING = "Three landmarks that are not on one line are needed."

@@ -57,7 +57,7 @@ class FitButton:
         if hand.pose is before:
             hand.place(fit.pose)
             hand.before = outline_items(hand.model.with_pose(before), hand.cameras, BESIDE_COLOUR)
-            self._on_fit(f"{says} The pose before is pink.", _WHAT)
+            self._on_fit(f"{says} The pose before it is drawn in pink.", _WHAT)
         elif self._frame_of() != frame and read_draft_start(self.session) == kept:
             self._keep(frame, fit, says)
         else:

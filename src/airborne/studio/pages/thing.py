@@ -20,7 +20,7 @@ from airborne.studio.writing import read_if_there
 _FILE = "thing.toml"
 _HELP = (
     "Measure the thing with a ruler: a millimetre wrong here is one in the result. Choose a solid and click it in a "
-    "picture, in even light: that is its colour. Without one it is taken at the first pose."
+    "picture, in even light: that is its colour. A solid without a colour takes it from the pictures at the first pose."
 )
 _DRAFT = "thing"  # its name among the drafts
 _SOON = "debounce=300"  # [ms] after the last key: a number is one change, not one for each digit
