@@ -10,6 +10,7 @@ from airborne.studio.trial_edits import (
     with_clicks,
     with_key,
     with_mask,
+    with_players,
     with_table,
     without_key,
     without_mask,
@@ -139,3 +140,17 @@ def test_a_camera_is_left_out_of_frames_that_there_are():
         clip_frames(40, 500, 33)
     with pytest.raises(TrialError, match="exchange them"):
         clip_frames(5, 3, 33)
+
+
+def test_players_that_were_found_stay_beside_those_clicked_in_the_same_frame():
+    found = with_players(TEXT, 4, {"a": {"joints_m": {"torso": [0, 0, 1]}}, "b": {"points_px": "b.csv"}})
+    clicked = {"c": {"points_px": "c.csv"}}
+
+    def names(text):
+        return [player["name"] for player in parse_toml(text)["start"]["player"]]
+
+    assert names(with_players(found, 4, clicked, keeps_found=True)) == ["a", "c"]
+    assert names(with_players(found, 5, clicked, keeps_found=True)) == ["c"]  # where they were in another frame is old
+    assert names(with_players(found, 4, clicked)) == ["c"]
+    again = with_players(found, 4, {"a": {"points_px": "a.csv"}}, keeps_found=True)
+    assert parse_toml(again)["start"]["player"] == [{"name": "a", "points_px": "a.csv"}]

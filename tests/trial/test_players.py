@@ -162,6 +162,12 @@ def test_legs_without_players_and_players_who_all_stand_by_are_refused(folder):
     assert "needs [[start.player]] tables" in complaint(folder, alone)
     torsos = text[: text.index("[[start.player]]")] + '[[start.player]]\nname = "a"\njoints_m = {torso = [0, 0, 1]}\n'
     assert "every player is a bystander" in complaint(folder, torsos)
+    columns = ",".join(f"{camera.name}_u,{camera.name}_v" for camera in rig())
+    px = ",".join(f"{u},{v}" for u, v in (camera.px_from_world([0, 0, 1.0]) for camera in rig()))
+    (folder / "a.csv").write_text(f"point,{columns}\ntorso,{px}\n")
+    in_a_table = read(folder, torsos.replace("joints_m = {torso = [0, 0, 1]}", 'points_px = "a.csv"'))
+    with pytest.raises(TrialError, match="every player is a bystander"):
+        players_tracker_of(in_a_table, rig())
 
 
 def test_settings_of_legs_are_refused_for_a_body(folder, thrown_cross):

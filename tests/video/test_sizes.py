@@ -1,5 +1,7 @@
 """A video of another size than its calibration is refused, and the mend is the one that fits the two sizes."""
 
+from dataclasses import replace
+
 import pytest
 
 from airborne.cameras import Rig
@@ -25,6 +27,13 @@ def test_mend_of_a_size(factor, mend):
         check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [size])
     assert "\n" not in str(error.value)
     assert mend in str(error.value) if mend else "saved_" not in str(error.value)
+
+
+def test_every_camera_of_another_size_is_named_in_one_line():
+    cameras = [replace(CAMERAS[0], name=name) for name in ("a", "b", "c")]
+    sizes = [(8, 8), cameras[1].size, (8, 8)]
+    with pytest.raises(VideoError, match=r"^a: a\.mp4 is 8×8 px, .* px \(c differs too\); give the video"):
+        check_sizes([VideoSource(each.name, "a.mp4") for each in cameras], Rig(tuple(cameras)), sizes)
 
 
 def test_the_calibrated_size_passes():

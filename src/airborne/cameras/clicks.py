@@ -63,11 +63,12 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
     names: list[str] = []
     values = np.full((len(rows), len(columns)), np.nan)
     for number, (line, row) in enumerate(rows):
-        if len(row) != len(header) or not row[key_column] or row[key_column] in names:
-            raise CalibrationError(
-                f"{path.name}, row {line}: '{','.join(row)[:60]}' needs {len(header)} values and a {key} of its own; "
-                f"{expected}"
-            )
+        shown = f"{path.name}, row {line}: '{','.join(row)[:60]}'"
+        if len(row) != len(header):
+            commas = ", and decimals points" if len(row) > len(header) else ""
+            raise CalibrationError(f"{shown} has {len(row)} values; it needs {len(header)}{commas}; {expected}")
+        if not row[key_column] or row[key_column] in names:
+            raise CalibrationError(f"{shown} needs a {key} of its own; {expected}")
         names.append(row[key_column])
         cells = row[:key_column] + row[key_column + 1 :]
         where = f"{path.name}, row {line} ({key} '{row[key_column]}')"

@@ -37,7 +37,7 @@ def open_file(name: str, path: Path | str) -> InputContainer:
     if not path.is_file():
         raise VideoError(f"{name}: {path} is no file; give a video, or read pipes and devices with --live")
     if path.stat().st_size == 0:
-        raise VideoError(f"{name}: video {path} is empty (0 bytes); copy it again")
+        raise VideoError(f"{name}: {path} is empty (0 bytes); copy it again")
     try:
         return _open(f"file:{path.absolute()}", protocols="file")
     except (FFmpegError, OSError, ValueError) as error:

@@ -22,7 +22,8 @@ def check_sizes(sources: Sequence[VideoSource], rig: Rig, sizes: Sequence[Size])
         return
     (source, size, calibrated), *others = wrong
     actual, expected = ("×".join(map(str, each)) for each in (size, calibrated))
-    also = f", as little as that of {join_names([each.name for each, *_ in others])}" if others else ""
+    verb = "differs" if len(others) == 1 else "differ"
+    also = f" ({join_names([each.name for each, *_ in others])} {verb} too)" if others else ""
     raise VideoError(
         f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px{also}; give the "
         f"video that was calibrated, or the calibration of this size{_saved_otherwise(size, calibrated)}"

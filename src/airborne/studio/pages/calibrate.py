@@ -129,6 +129,7 @@ class CalibratePanel:
             choice.props("outlined dense options-dense").style("min-width: 150px")
 
     def _board_form(self) -> None:
+        ui.label("Describe another board:").classes("small")
         with ui.element("div").classes("row-line"):
             numbers = [
                 ui.number(label, value=value, min=0, step=step).props("outlined dense").style("width: 110px")

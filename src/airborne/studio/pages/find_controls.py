@@ -10,7 +10,7 @@ from typing import Any
 
 from nicegui import ui
 
-from airborne.errors import UNDECIDED
+from airborne.errors import UNDECIDED, count
 from airborne.io.text import read_json
 from airborne.run.find import describe_probability
 from airborne.studio.commands import Command
@@ -57,7 +57,8 @@ class FindControls:
         if command.code == 0:
             found = json.loads(command.output())
             self.candidates = ()
-            says = f"Found in frame {found['frame']}, {describe_probability(found['probability'])}."
+            what = f"{count(len(found['player']), 'player')} found" if "player" in found else "Found"
+            says = f"{what} in frame {found['frame']}, {describe_probability(found['probability'])}."
         else:
             document = read_json(self.session.file(FOUND_LIST))
             self.candidates = tuple({**each, "frame": document["frame"]} for each in document["candidates"])

@@ -15,6 +15,7 @@ from airborne.studio.strips import doubtful_frames
 from airborne.studio.view import CameraViews
 
 _KEYS = {"a": "uncertain", "r": "lost"}  # as amber and red
+_UNSEEN = {"uncertain": "", "lost": ", or a joint that no picture shows"}
 
 
 class Jumps:
@@ -32,7 +33,9 @@ class Jumps:
         ui.keyboard(on_key=self.press, ignore=["input", "select", "textarea"])
         for key, what in _KEYS.items():
             button = ui.button(f"Next {what}", on_click=lambda _, to=what: self.go(to)).props("flat")
-            self._buttons[what] = button.tooltip(f"the body, a joint or a player; key {key.upper()}")
+            self._buttons[what] = button.tooltip(
+                f"frames with a {what} body, joint or player{_UNSEEN[what]}; key {key.upper()}"
+            )
 
     @asynccontextmanager
     async def turning_to(self, run: Path) -> AsyncIterator[None]:
