@@ -109,7 +109,7 @@ def track(trial: Trial, case: Case) -> CheckedRun:
         state, estimate = step(tracker, state, frames)
         estimates.append(estimate)
         kept.add(frames)
-    args = Motion.collect(estimates), model, recording.rig, trial.start.pose, kept, opened.calibration
+    args = Motion.collect(estimates), model, recording.rig, trial.start.pose, kept
     return check_run(*args, is_preset=False)
 
 

@@ -25,6 +25,7 @@ _LONGEST_GAP_S = 0.26  # between images of which the board's motion can be inter
 _LOOSE_SYNC_NOISE_SHARE = 0.75  # lags are accepted where they lower the noise to less than this share
 _FEWEST_MOMENTS = 10  # with a board, to estimate lags
 _LAG_SD = 0.5  # of the time between images
+_LEAST_RMS_PX = 1e-6  # of a fit: rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -75,8 +76,9 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
         final = _with_lens_model_error(inputs, final)
     held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
     left_out = np.concatenate(list(held_out_px.values()))
-    worse = np.sqrt(np.mean(left_out[np.isfinite(left_out)] ** 2)) / final.rms_px()  # NaN where nothing is left out
-    rig = _with_wider_errors(final.rig, np.full(len(final.rig), np.fmax(worse, 1.0)))
+    left_out = left_out[np.isfinite(left_out)]
+    worse = np.sqrt(np.mean(left_out**2)) / max(final.rms_px(), _LEAST_RMS_PX) if len(left_out) else 1.0
+    rig = _with_wider_errors(final.rig, np.full(len(final.rig), worse))
     if inputs.points:
         rig = Rig(tuple(replace(camera, world_sd=SURVEYED_SD) for camera in rig))
     final = replace(final, rig=rig)

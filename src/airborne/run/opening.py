@@ -131,7 +131,8 @@ def _camera_as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Cam
     du, dv = table.saved_offset_px
     if table.saved_scale == 1 and (du, dv) == (0, 0):
         return camera
-    return camera.resample(scale=(table.saved_scale, table.saved_scale), offset=(du, dv), size=size)
+    saved = camera.resample(scale=(table.saved_scale, table.saved_scale), offset=(du, dv), size=size)
+    return replace(saved, shift_sd_px=camera.shift_sd_px / table.saved_scale)
 
 
 def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
