@@ -68,8 +68,15 @@ class Uncertainty:
             moves[parameters[kept]] = np.linalg.pinv(scaled.T @ scaled) @ (scaled.T @ rows) / size[:, None]
             moves[3:6] = camera.camera_from_world.rotation.as_matrix() @ moves[3:6]
             moves[6] /= camera.K[0, 0]
-            found.append(moves @ self.covariance[np.ix_(free, free)] @ moves.T)
+            found.append(_without_rounding(moves @ self.covariance[np.ix_(free, free)] @ moves.T))
         return found
+
+
+def _without_rounding(covariance: Array) -> Array:
+    """Return the nearest covariance (n, n): symmetric, and without variances below zero in any direction."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 / sd[:, None] / sd)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T * sd[:, None] * sd
 
 
 def gauge_fixed_inverse(reduced: Array, gauge: Array) -> Array:
