@@ -69,7 +69,8 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
     if head["n_uncertain"]:
         yield (
             f"{count_of(head['n_uncertain'], n, 'frame')} uncertain: outline and images agree less there than in "
-            "others, the body is badly seen, or the self-check doubts it; look at them in the overlay videos before use."
+            "others, the body is badly seen, or the self-check doubts it; look at them in the overlay videos before "
+            "use."
         )
     for what in ("position", "rotation"):
         if head[f"n_{what}_unobservable"]:
