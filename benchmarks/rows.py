@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MEASURED = {  # rooms of src/airborne that the rows of a file measure; of other files the whole package
     "speed": ("appearance", "kernels", "rendering", "tracking", "video"),
     "calibration": ("calibration", "cameras"),
+    "calibration_file": ("calibration", "cameras", "tracking"),
     "sync": ("sync", "video"),
     "jumps": ("motion/jumps", "synthetic/block", "tracking/capsules"),
     "find_start": ("appearance", "run", "tracking/first_pose"),

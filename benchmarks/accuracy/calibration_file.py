@@ -1,8 +1,8 @@
 """What a calibration file is worth that says how good it is: `python benchmarks/accuracy/calibration_file.py`.
 
-Synthetic throws (seeds 401 to 406), calibrated from control points with clicks like a person's, tracked with the file that
-`airborne calibrate` leaves, and with the same file without its covariances. Of each: the median standard deviation of
-position and rotation, and the errors within two of them. Three minutes.
+Synthetic throws (seeds 401 to 406), calibrated from control points with clicks like a person's, tracked with the file
+that `airborne calibrate` leaves, and with the same file without its covariances. Of each: the median standard deviation
+of position and rotation along an axis, and the errors within two of them. Four minutes.
 """
 
 from __future__ import annotations
