@@ -94,3 +94,19 @@ def test_frames_before_the_first_pose_are_asked_for_and_taken_back(tmp_path):
         page.get_by_text("from frame 20, the first pose's", exact=True).wait_for()
         assert first.input_value() == "20"
     assert read_toml(trial)["track"] == {"method": "refined"}
+
+
+def test_what_tracking_ended_with_stays_and_nothing_is_chosen_while_it_goes_on(tmp_path):
+    trial = write_trial(tmp_path / "block", N)
+    (trial.parent / "results").mkdir()
+    (trial.parent / "results" / "mine.txt").touch()
+    reason = "results is not empty and holds no run; give a new or empty folder"
+    with fork_studio(trial) as address, open_page(address.replace("/?", "/track?")) as page:
+        wait_for_frame(page, 0)
+        page.get_by_role("button", name="Track", exact=True).click()
+        page.get_by_role("button", name="Stop").wait_for()
+        assert page.get_by_label("method").is_disabled() and page.get_by_label("last frame").is_disabled()
+        page.locator(".warn", has_text=reason).wait_for()
+        assert page.get_by_label("method").is_enabled()
+        page.reload()  # also to whom it was not told
+        page.locator(".warn", has_text=reason).wait_for()
