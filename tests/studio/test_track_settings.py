@@ -105,8 +105,10 @@ def test_what_tracking_ended_with_stays_and_nothing_is_chosen_while_it_goes_on(t
         wait_for_frame(page, 0)
         page.get_by_role("button", name="Track", exact=True).click()
         page.get_by_role("button", name="Stop").wait_for()
-        assert page.get_by_label("method").is_disabled() and page.get_by_label("last frame").is_disabled()
+        method = page.locator(".q-select.q-field--disabled", has_text="method")
+        method.wait_for()
+        assert page.get_by_label("last frame").is_disabled()
         page.locator(".warn", has_text=reason).wait_for()
-        assert page.get_by_label("method").is_enabled()
+        method.wait_for(state="detached")
         page.reload()  # also to whom it was not told
         page.locator(".warn", has_text=reason).wait_for()
