@@ -25,7 +25,12 @@ _LONGEST_GAP_S = 0.26  # between images of which the board's motion can be inter
 _LOOSE_SYNC_NOISE_SHARE = 0.75  # lags are accepted where they lower the noise to less than this share
 _FEWEST_MOMENTS = 10  # with a board, to estimate lags
 _LAG_SD = 0.5  # of the time between images
-_LEAST_RMS_PX = 1e-6  # of a fit: rounding
+
+
+def rms(distances: Array) -> float:
+    """Return the root mean square of those that are known; NaN where none is."""
+    distances = distances[np.isfinite(distances)]
+    return float(np.sqrt(np.mean(distances**2))) if len(distances) else float("nan")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,6 +49,11 @@ class RigCalibration:
     def rig(self) -> Rig:
         """The cameras."""
         return self.adjustment.rig
+
+    @property
+    def held_out_rms_px(self) -> float:
+        """The RMS distance of all held-out observations from their predictions [px]; NaN where none is held out."""
+        return rms(np.concatenate(list(self.held_out_px.values())))
 
     def held_out_px_of(self, camera: str) -> Array:
         """Return the distances of a camera's held-out observations from their predictions, of all sources [px]."""
@@ -75,15 +85,8 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
     if frame.is_unchanged and sources.kinds == ["control_points"]:
         final = _with_lens_model_error(inputs, final)
     held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
-    left_out = np.concatenate(list(held_out_px.values()))
-    left_out = left_out[np.isfinite(left_out)]
-    worse = np.sqrt(np.mean(left_out**2)) / max(final.rms_px(), _LEAST_RMS_PX) if len(left_out) else 1.0
-    rig = _with_wider_errors(final.rig, np.full(len(final.rig), worse))
-    if inputs.points:
-        rig = Rig(tuple(replace(camera, world_sd=SURVEYED_SD) for camera in rig))
-    final = replace(final, rig=rig)
     lags = _lags(final) if lag_sd_s is not None else {}
-    return RigCalibration(
+    calibration = RigCalibration(
         inputs=inputs,
         adjustment=final,
         world=frame.description,
@@ -92,6 +95,12 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
         resections=mended,
         notes=(*inputs.notes, *_lag_notes(lags)),
     )
+    rig, rms_px, left_out_px = final.rig, final.rms_px(), calibration.held_out_rms_px
+    if left_out_px > rms_px > 0:
+        rig = _with_wider_errors(rig, np.full(len(rig), left_out_px / rms_px))
+    if inputs.points:
+        rig = Rig(tuple(replace(camera, world_sd=SURVEYED_SD) for camera in rig))
+    return replace(calibration, adjustment=replace(final, rig=rig))
 
 
 def _resect_misplaced(inputs: Inputs) -> tuple[Rig, tuple[Resection, ...]]:

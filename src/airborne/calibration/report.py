@@ -10,7 +10,7 @@ import numpy as np
 
 from airborne.calibration.bundle.lenses import CAMERA_PARAMETERS, FISHEYE_PARAMETERS
 from airborne.calibration.diagnosis.results import diagnose
-from airborne.calibration.from_sources import RigCalibration
+from airborne.calibration.from_sources import RigCalibration, rms
 from airborne.cameras import Camera
 from airborne.types import Array
 
@@ -38,7 +38,7 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
             "sd": sd,
             "n_observations": int(sum(np.isfinite(r[s.camera == i, 0]).sum() for r, s in _pairs(calibration))),
             "rms_px": _number(adjusted.rms_px(camera=i)),
-            "held_out_rms_px": _number(_rms(calibration.held_out_px_of(camera.name))),
+            "held_out_rms_px": _number(rms(calibration.held_out_px_of(camera.name))),
             "lens_model": None if fit is None else fit.model,
             "lens_held_out_rms_px": {} if fit is None else fit.held_out_rms_px,
             **_change_from_start(calibration, camera),
@@ -51,7 +51,7 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
         "sources": {source.name: _source(calibration, i) for i, source in enumerate(adjusted.sources)},
         "rms_px": _number(adjusted.rms_px()),
         "median_px": _number(float(np.nanmedian(np.concatenate(residual_distances_px(calibration))))),
-        "held_out_rms_px": _number(_held_out_rms_px(calibration)),
+        "held_out_rms_px": _number(calibration.held_out_rms_px),
         "world": calibration.world,
         "sd_is_within_the_rig": adjusted.is_gauge_free,
         "mended": [mending.describe() for mending in calibration.resections],
@@ -145,7 +145,7 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
                 f"{share:.0%} of source '{source.name}' fit nothing: it contradicts others, is of other cameras, or "
                 "has points exchanged in some of them"
             )
-    rms_px, held_out_px = calibration.adjustment.rms_px(), _held_out_rms_px(calibration)
+    rms_px, held_out_px = calibration.adjustment.rms_px(), calibration.held_out_rms_px
     if held_out_px > _SUSPECT_RATIO * rms_px:
         sentences.append(
             f"what is left out of the fit lies {held_out_px / rms_px:.1f} times as far from its prediction as what is "
@@ -158,10 +158,6 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
             "with other lenses; add control points, a wand, a court or a board that several cameras see"
         )
     return tuple(sentences)
-
-
-def _held_out_rms_px(calibration: RigCalibration) -> float:
-    return _rms(np.concatenate(list(calibration.held_out_px.values())))
 
 
 def _share_left_out(calibration: RigCalibration, i: int) -> float:
@@ -177,24 +173,19 @@ def _source(calibration: RigCalibration, i: int) -> dict[str, Any]:
     is_used = np.isfinite(distances)
     return {
         "n_observations": int(is_used.sum()),
-        "rms_px": _number(_rms(distances)),
+        "rms_px": _number(rms(distances)),
         "median_px": _number(float(np.median(distances[is_used]))) if is_used.any() else None,
         "noise_sd_px": float(np.mean(adjusted.noise_px[i] * np.asarray(source.sd_px))),
-        "held_out_rms_px": _number(_rms(calibration.held_out_px[source.name])),
+        "held_out_rms_px": _number(rms(calibration.held_out_px[source.name])),
         "left_out_percent": 100 * _share_left_out(calibration, i) if len(distances) else None,
         "rms_px_by_camera": {
-            name: _number(_rms(distances[source.camera == c])) for c, name in enumerate(calibration.rig.names)
+            name: _number(rms(distances[source.camera == c])) for c, name in enumerate(calibration.rig.names)
         },
     }
 
 
 def _pairs(calibration: RigCalibration) -> list:
     return list(zip(calibration.adjustment.residual_px, calibration.adjustment.sources, strict=True))
-
-
-def _rms(distances: Array) -> float:
-    distances = distances[np.isfinite(distances)]
-    return float(np.sqrt(np.mean(distances**2))) if len(distances) else float("nan")
 
 
 def _number(value: float) -> float | None:

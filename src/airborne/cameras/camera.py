@@ -19,6 +19,12 @@ from airborne.types import Array
 Lens = Literal["brown", "fisheye"]
 
 
+def scale_lengths(covariance: Array, factor: float) -> Array:
+    """Return a camera's covariance (7, 7) with lengths that are `factor` times as large; see `Camera`."""
+    sizes = np.array([1, 1, 1, factor, factor, factor, 1.0])
+    return covariance * np.outer(sizes, sizes)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Camera:
     """A pinhole camera with distortion: x right, y down, z forward; pixel centres at whole numbers.

@@ -156,7 +156,7 @@ def write_rig(
         raise CalibrationError(missing_folder(path))
     for name, text in texts.items():
         write_text(path / name, text)  # path / "" is path itself
-    return notes
+    return (*notes, "how well the cameras are known") if kind != "pose2sim" and rig.states_errors else notes
 
 
 def write_pose2sim(path: str | Path, rig: Rig, *, errors_px: Mapping[str, float] | None = None) -> None:
@@ -184,7 +184,6 @@ def _texts(
     """Return the texts by file name, and what they cannot hold."""
     if kind == "easymocap":
         return easymocap_texts(rig, unit), ()
-    unsaid = ("how well the cameras are known",) if kind != "pose2sim" and rig.states_errors else ()
     write = {
         "pose2sim": lambda: (pose2sim_text(rig, errors_px), ()),
         "aniposelib": lambda: (aniposelib_text(rig, unit), ()),
@@ -195,7 +194,7 @@ def _texts(
         "dlt": lambda: (dlt_text(rig, pixels, unit), dlt_losses(rig)),
     }
     text, notes = write[kind]()
-    return {"": text}, (*notes, *unsaid)
+    return {"": text}, notes
 
 
 def _unit(kind: str, unit: Unit | None) -> Unit:

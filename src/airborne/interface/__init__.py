@@ -6,7 +6,7 @@ several stages with the name of the stage before them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from inspect import signature
 from numbers import Integral
@@ -239,23 +239,17 @@ def synthesise(
     False
     """
     require_choice(scene, _SCENES, "scene")
-    folder = Path(folder)
-    with _reporting(progress, "rendering") as report:
-        if scene == "block":
-            _check_options(block_scene, options)
-            write_block(folder, block_scene(seed, **options), progress=report)
-        else:
-            write = write_thrown_cross if scene == "cross" else write_somersault
-            _check_options(write, options)
-            write(folder, seed=seed, progress=report, **options)
-    return folder / "trial.toml"
-
-
-def _check_options(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
-    """Raise AirborneError for an option that a function does not have."""
-    names = [name for name in signature(function).parameters if name not in ("folder", "seed", "progress")]
+    folder, write = Path(folder), write_thrown_cross if scene == "cross" else write_somersault
+    makes = signature(block_scene if scene == "block" else write)
+    names = [name for name in makes.parameters if name not in ("folder", "seed", "progress")]
     if unknown := [name for name in options if name not in names]:
         raise AirborneError(f"synthesise has no option {', '.join(unknown)}; it has: {', '.join(names)}")
+    with _reporting(progress, "rendering") as report:
+        if scene == "block":
+            write_block(folder, block_scene(seed, **options), progress=report)
+        else:
+            write(folder, seed=seed, progress=report, **options)
+    return folder / "trial.toml"
 
 
 def _folder(run: Run | FilePath) -> Path:

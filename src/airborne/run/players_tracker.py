@@ -20,6 +20,7 @@ from airborne.tracking.players import PlayerStart, PlayersTracker
 from airborne.trial.file import Trial
 from airborne.trial.players import start_of
 from airborne.trial.settings import ParticleSettings
+from airborne.trial.start import ONLY_BYSTANDERS
 from airborne.types import Array
 from airborne.video import Frames, View
 
@@ -38,7 +39,7 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
     """
     starts = player_starts(trial, rig)
     if not any(start.has_legs for start in starts):
-        raise TrialError(f"{trial.name}: every player is a bystander; give one of them the points of the legs too")
+        raise TrialError(f"{trial.name}: {ONLY_BYSTANDERS}")
     for start in starts:
         _check_visible(trial, start, rig)
     if not isinstance(trial.track, ParticleSettings):

@@ -13,6 +13,8 @@ from airborne.trial.players import PlayerTable
 from airborne.trial.pose_forms import BY_HAND, PoseForms
 from airborne.trial.table import Switch
 
+ONLY_BYSTANDERS = "every player is a bystander; give one of them the points of the legs too"
+
 
 class StartTable(PoseForms):
     """The first pose: set by hand, or found from positions of the body's landmarks; or those of several players."""
@@ -40,7 +42,7 @@ class StartTable(PoseForms):
         if len(set(names)) != len(names):
             raise ValueError(f"two players share a name: {', '.join(names)}; give each its own")
         if names and all(player.is_bystander for player in self.player):
-            raise ValueError("every player is a bystander; give one of them the points of the legs too")
+            raise ValueError(ONLY_BYSTANDERS)
         if BY_HAND & self.model_fields_set:
             if self.position_m is None:
                 raise ValueError("position_m is missing: give where the root's origin is")

@@ -18,7 +18,7 @@ from airborne.calibration.bundle.problem import build_problem, initial_state, ri
 from airborne.calibration.bundle.robust_fit import RobustFit
 from airborne.calibration.bundle.source import CameraPrior, FreeParameters, Source
 from airborne.calibration.bundle.uncertainty import estimate_uncertainty
-from airborne.cameras.camera import Camera, Rig
+from airborne.cameras.camera import Camera, Rig, scale_lengths
 from airborne.errors import CalibrationError
 from airborne.geometry.descent import Outcome
 from airborne.types import Array, Ints
@@ -135,8 +135,7 @@ def _is_noise_known(sources: Sequence[Source]) -> NDArray[np.bool_]:
 def _transform_camera(camera: Camera, new_from_old: RigidTransform, scale: float) -> Camera:
     old = camera.camera_from_world
     scaled = RigidTransform.from_components(old.translation * scale, old.rotation)
-    sizes = np.array([1, 1, 1, scale, scale, scale, 1.0])
-    covariance = None if camera.covariance is None else camera.covariance * np.outer(sizes, sizes)
+    covariance = None if camera.covariance is None else scale_lengths(camera.covariance, scale)
     return replace(camera, camera_from_world=scaled * new_from_old.inv(), covariance=covariance)
 
 

@@ -15,7 +15,7 @@ from airborne.io.text import read_csv
 from airborne.types import Array
 
 _WORLD_COLUMNS = ("x_m", "y_m", "z_m")
-SURVEYED_SD = 0.002  # of the size of a world of surveyed points [share]: 2 mm a metre, of a tape or a total station
+SURVEYED_SD = 0.002  # of the size of a world of surveyed points [share]; chosen as usual of a tape, 2 mm a metre
 _MOST_COLUMNS = 1000  # two for each camera
 _EXPECTED = "expected point,x_m,y_m,z_m,cam1_u,cam1_v,..."
 

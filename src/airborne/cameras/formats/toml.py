@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from airborne.cameras.camera import Camera
+from airborne.cameras.camera import Camera, scale_lengths
 from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, parse_size
 from airborne.errors import CalibrationError
 
 _ROTATION_SHAPES = ((3,), (3, 3))  # a rotation vector or a matrix
-_ROUNDING = 1e-6  # of a covariance's eigenvalues, over the variances
+# of a covariance's eigenvalues, over the variances; chosen between rounding, 1e-12, and matrices that are none
+_ROUNDING = 1e-6
 _TERM_SHAPES = {False: ((4,), (5,), (8,)), True: ((4,),)}  # by whether the lens is a fisheye
 
 
@@ -42,8 +43,7 @@ def errors_from_table(where: str, table: dict, metres: float) -> dict[str, Any]:
     """
     if "covariance" not in table:
         return {}
-    sizes = np.array([1, 1, 1, metres, metres, metres, 1.0])
-    covariance = parse_array(where, "covariance", table["covariance"], (7, 7)) * np.outer(sizes, sizes)
+    covariance = scale_lengths(parse_array(where, "covariance", table["covariance"], (7, 7)), metres)
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
     values = np.linalg.eigvalsh((covariance + covariance.T) / 2 / sd[:, None] / sd)
     if not np.allclose(covariance, covariance.T, rtol=1e-6, atol=1e-12) or values[0] < -_ROUNDING:

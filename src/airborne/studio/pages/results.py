@@ -79,11 +79,10 @@ def _run_card(session: Session, folder: Path, found: _Found) -> None:
 
 
 def _numbers(summary: dict[str, Any]) -> None:
+    values = summary | summary.get("method", {})  # the method's name is among its settings
     with ui.element("table").classes("plain"):
         for key, words in _NUMBERS.items():
-            value = summary.get(key)
-            value = value.get(key) if isinstance(value, dict) else value  # the method is among its settings
-            if isinstance(value, int | float | str):
+            if isinstance(value := values.get(key), int | float | str):
                 with ui.element("tr"):
                     for tag, text in (
                         ("th", words),
