@@ -34,10 +34,10 @@ def warm_kernels() -> None:
 
 
 def _track_bodies() -> None:
-    """Track the bundled example from the trial file to the report, and a synthetic somersault, images in memory."""
+    """Track the bundled example from its trial file, and a synthetic somersault, images in memory."""
     trial = read_trial(example_trial("thrown_cross"), {"stop": _N_FRAMES})
     with tempfile.TemporaryDirectory() as folder:
-        track_trial(trial, Path(folder))
+        track_trial(trial, Path(folder), pictures=False)
     scene = somersault_scene("moving-arms", target="ellipsoids")
     frames = list(islice(scene_frames(scene), _N_FRAMES))
     model = sample_body_colours(scene.model, start_pose(scene), frames[0])

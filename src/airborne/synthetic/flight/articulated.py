@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.interpolate import BPoly, PPoly
+from scipy.interpolate import BarycentricInterpolator, BPoly, PPoly
 from scipy.spatial.transform import Rotation
 
 from airborne.body import BodyModel
@@ -24,6 +24,7 @@ from airborne.synthetic.flight.rigid import MassProperties, SampledFlight
 from airborne.types import Array
 
 Rate = Callable[[float, Array], Array]  # time and state to the state's rate
+_N_NODES = 64  # between breaks: interpolates a mass distribution to 1e-14 of itself, every joint going through its range
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,8 +86,15 @@ def fly_articulated(
     time_s = np.asarray(time_s, float)
     segments = _Segments.of(model)
 
-    def turning(t: float, q: Array) -> Array:
-        return _quaternion_rate(q, segments.angular_velocity(_matrix(q), takeoff, *_state(joints, np.array([t])))[0])
+    def turning_between(begin: float, end: float) -> Rate:
+        mass = segments.tabulate(joints, begin, end)
+
+        def turning(t: float, q: Array) -> Array:
+            now = mass(t)
+            own = takeoff.angular_momentum @ _matrix(q) - now[9:]
+            return _quaternion_rate(q, np.linalg.solve(now[:9].reshape(3, 3), own))
+
+        return turning
 
     start = Rotation.from_matrix(takeoff.R).as_quat()
     quaternions = np.tile(start, (len(time_s), 1))
@@ -94,7 +102,9 @@ def fly_articulated(
         times, back = np.unique(time_s[selected], return_inverse=True)
         if len(times):
             order = slice(None, None, 1 if times[-1] > 0 else -1)
-            quaternions[selected] = _integrate(turning, start, joints.x, times[order], tolerance=tolerance)[order][back]
+            quaternions[selected] = _integrate(turning_between, start, joints.x, times[order], tolerance=tolerance)[
+                order
+            ][back]
     R = Rotation.from_quat(quaternions).as_matrix()
     angles, rates = _state(joints, time_s)
     t = time_s[:, None]
@@ -178,6 +188,15 @@ class _Segments:
         momentum = np.einsum("nsij,nsj->ni", own, w) + self.mass_kg @ _cross(d, d_rate)
         return MassDistribution(centre, inertia, momentum)
 
+    def tabulate(self, joints: PPoly, begin: float, end: float) -> BarycentricInterpolator:
+        """Interpolate inertia and momentum (12,) between two neighbouring breaks, where the motion is smooth [s]."""
+        nodes = (begin + end + (end - begin) * np.cos(np.linspace(np.pi, 0, _N_NODES))) / 2  # of Chebyshev
+        shape = self.mass_distribution(*_state(joints, nodes))
+        weights = (-1.0) ** np.arange(_N_NODES)
+        weights[[0, -1]] /= 2
+        values = np.column_stack([shape.inertia.reshape(_N_NODES, 9), shape.momentum])
+        return BarycentricInterpolator(nodes, values, wi=weights)
+
     def angular_velocity(self, R: Array, takeoff: Takeoff, angles: Array, rates: Array) -> Array:
         """Return the root's angular velocity (n, 3) in its own frame [rad/s], from R (n, 3, 3) world from root."""
         shape = self.mass_distribution(angles, rates)
@@ -185,7 +204,9 @@ class _Segments:
         return np.linalg.solve(shape.inertia, own[..., None])[..., 0]
 
 
-def _integrate(turning: Rate, start: Array, breaks: Array, times: Array, *, tolerance: float) -> Array:
+def _integrate(
+    turning_between: Callable[[float, float], Rate], start: Array, breaks: Array, times: Array, *, tolerance: float
+) -> Array:
     """Integrate quaternions from time 0 to the times (n,), which all lie on one side of it, nearest first: (n, 4).
 
     Integrated from break to break: a long step would miss a short movement.
@@ -195,6 +216,7 @@ def _integrate(turning: Rate, start: Array, breaks: Array, times: Array, *, tole
         at = times[selected]
         to_end = [] if len(at) and at[-1] == end else [end]
         at = np.append(at, to_end)
+        turning = turning_between(begin, end)
         solved = solve_ivp(turning, (begin, end), start, "DOP853", at, rtol=tolerance, atol=tolerance).y.T
         start = solved[-1] / np.linalg.norm(solved[-1])
         quaternions[selected] = solved[: len(solved) - len(to_end)]
