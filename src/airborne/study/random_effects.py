@@ -24,7 +24,7 @@ Level = Literal["within athletes", "between athletes", "between trials"]  # what
 
 _FEWEST = 2  # athletes, or trials of a single athlete
 _LEAST = 1e-30  # variance that a weight may come from
-_DOUBLINGS, _HALVINGS = 60, 60  # of the variance between athletes, to bracket it and to find it
+_HALVINGS = 60  # of what brackets the variance between athletes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -146,8 +146,8 @@ def _between(means: Array, variances: Array) -> Array:
     """Return the variance between athletes (nodes,) at which the weighted squares are what they are expected to be."""
     low = np.zeros(means.shape[1])
     high = np.maximum(np.var(means, axis=0, ddof=1), _LEAST)
-    for _ in range(_DOUBLINGS):
-        high = np.where(_excess(high, means, variances) > 0, 2 * high, high)
+    while np.any(is_low := _excess(high, means, variances) > 0):
+        high = np.where(is_low, 2 * high, high)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         is_low = _excess(middle, means, variances) > 0

@@ -15,7 +15,7 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.calibration.bundle.loss import Loss
 from airborne.calibration.bundle.problem import build_problem, initial_state, rig_from_state, sources_from_state
-from airborne.calibration.bundle.robust_fit import RobustFit
+from airborne.calibration.bundle.robust_fit import LEAST_DECREASE, RobustFit
 from airborne.calibration.bundle.source import CameraPrior, FreeParameters, Source
 from airborne.calibration.bundle.uncertainty import estimate_uncertainty
 from airborne.cameras.camera import Camera, Rig, scale_lengths
@@ -73,18 +73,20 @@ def adjust(
     prior: CameraPrior | None = None,
     loss: Loss = "cauchy",
     progress: Callable[[int, float], None] | None = None,
+    least_decrease: float = LEAST_DECREASE,
 ) -> Adjustment:
     """Estimate cameras, free points and targets from all sources at once, starting from `rig` and the sources' values.
 
     free: the free parameters of all cameras, or by name (default `FreeParameters()`). prior: about the initial cameras.
-    progress is called with the step's number and the cost. Raises CalibrationError where nothing is measured.
+    progress is called with the step's number and the cost. It stops where a step would lower the cost by less than
+    `least_decrease` [nat]. Raises CalibrationError where nothing is measured.
     """
     free_by_camera = _free_by_camera(rig, free if free is not None else FreeParameters())
     problem = build_problem(rig, sources, free_by_camera)
     state = initial_state(rig, sources, problem)
     if not problem.is_used.any():
         raise CalibrationError("nothing to adjust: no point is seen by enough cameras")
-    optimiser = RobustFit(problem, state, prior, loss, progress)
+    optimiser = RobustFit(problem, state, prior, loss, progress, least_decrease)
     state, noise, outcome = optimiser.run(_is_noise_known(sources))
     fit = optimiser.linearise(state, noise)
     uncertainty = estimate_uncertainty(

@@ -27,7 +27,8 @@ from airborne.geometry.descent import Descent, NielsenRule, Outcome, descend
 from airborne.types import Array, Ints
 
 _MOST_STEPS, _MOST_SCALINGS = 200, 12  # of the iteration; changes of scale between whole iterations, at most
-_CONVERGED = 1e-5, 1e-10  # predicted decrease, absolute and relative to the cost, below which the iteration stops
+LEAST_DECREASE = 1e-5  # [nat] predicted decrease of the cost below which the iteration stops: 0.004 sds from the end
+_LEAST_SHARE = 1e-10  # the same as a share of the cost: rounding
 _SAME_NOISE = 0.01  # relative change of the noise below which it is settled
 _DAMPING = NielsenRule(first=1e-3, least=1e-12, most=1e8, least_factor=1 / 10)
 _LEAST_SCALE = 1e-6  # of a source's noise, in its assumed standard deviations
@@ -63,6 +64,7 @@ class RobustFit:
     prior: CameraPrior | None
     loss: Loss
     progress: Callable[[int, float], None] | None
+    least_decrease: float = LEAST_DECREASE  # [nat]
 
     def run(self, is_known: NDArray[np.bool_]) -> tuple[State, Noise, Outcome]:
         """Return the best state, the sources' noise, and why the last descent ended."""
@@ -112,7 +114,7 @@ class RobustFit:
             lambda state: _Iterate(self, state, noise),
             _DAMPING,
             most_steps=_MOST_STEPS - n_before,
-            least_predicted=_CONVERGED,
+            least_predicted=(self.least_decrease, _LEAST_SHARE),
             progress=report and (lambda n_steps, cost: report(n_before + n_steps, cost)),
         )
 

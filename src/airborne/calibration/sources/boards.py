@@ -187,17 +187,22 @@ def mirror_corners(detected: DetectedCorners, width: int) -> DetectedCorners:
 
 
 def _two_sided_finder(board: Board, find: Detector) -> Detector:
-    """Return a detector of either side: the back is searched in the mirrored image."""
-    n = board.inner_size[0] * board.inner_size[1]
+    """Return a detector of either side, the back in the mirrored image; it first looks for the side last seen."""
+    n, seen_back = board.inner_size[0] * board.inner_size[1], False
+
+    def find_back(grey: NDArray[np.uint8]) -> DetectedCorners:
+        back = mirror_corners(find(mirror_image(grey)), grey.shape[1])
+        return replace(back, corner=back.corner + (n if board.thickness_m else 0))
 
     def find_side(grey: NDArray[np.uint8]) -> DetectedCorners:
-        front = find(grey)
-        if len(front.corner) > n / 2:
-            return front
-        back = find(mirror_image(grey))
-        if len(back.corner) <= len(front.corner):
-            return front
-        return replace(mirror_corners(back, grey.shape[1]), corner=back.corner + (n if board.thickness_m else 0))
+        nonlocal seen_back
+        sides = (find_back, find) if seen_back else (find, find_back)
+        best = sides[0](grey)
+        if len(best.corner) <= n / 2:
+            best = max(best, sides[1](grey), key=lambda side: len(side.corner))
+        if len(best.corner):
+            seen_back = best.is_back
+        return best
 
     return find_side
 

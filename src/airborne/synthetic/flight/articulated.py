@@ -24,7 +24,7 @@ from airborne.synthetic.flight.rigid import MassProperties, SampledFlight
 from airborne.types import Array
 
 Rate = Callable[[float, Array], Array]  # time and state to the state's rate
-_N_NODES = 64  # between breaks: interpolates a mass distribution to 1e-14 of itself, every joint going through its range
+_N_NODES = 64  # between two breaks: with every joint going through its range, a mass distribution to 1e-14 of itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
