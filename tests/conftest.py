@@ -45,6 +45,14 @@ def pytest_configure(config):
     config.option.loadscopereorder = False  # workers take the files in the order below, not those of most tests first
 
 
+def pytest_ignore_collect(collection_path, config):
+    """Read no file of which nothing was skipped, where only that is run."""
+    if config.getoption("skipped") and collection_path.suffix == ".py":
+        files = {node.split("::")[0] for node in config.cache.get(SKIPPED, [])}
+        return collection_path.relative_to(config.rootpath).as_posix() not in files or None
+    return None
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     """Start with the slowest files, so that no worker ends long before another; what is in no slow file is quick."""

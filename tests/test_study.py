@@ -19,7 +19,7 @@ pytestmark = pytest.mark.filterwarnings("default")  # those of Dask's own are no
 def done(tmp_path_factory):
     """The folder in which everything was done, and what each command printed."""
     folder, printed = tmp_path_factory.mktemp("study"), {}
-    write_season(folder, n_pictures=6)
+    write_season(folder, n_trials=1, n_pictures=6)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         mpl.use("Agg")
@@ -40,7 +40,7 @@ def rows_of(path):
 def test_every_throw_is_tracked(done):
     folder, printed = done
     rows = rows_of(folder / "results" / "trials.csv")
-    assert len(rows) == 2 * len(ATHLETES) * len(CONDITIONS)
+    assert len(rows) == len(ATHLETES) * len(CONDITIONS)
     assert {row["status"] for row in rows} == {"done"}
     assert {row["share_lost"] for row in rows} == {"0.0"}
     planned = printed["airborne batch study -o results --dry-run"].splitlines()
@@ -74,5 +74,5 @@ def test_the_page_of_a_batch_links_to_its_reports(done):
     folder, _ = done
     page = (folder / "results" / "index.html").read_text()
     links = re.findall(r'(?:href|src)="([^"]+)"', page)
-    assert len(links) > 30
+    assert len(links) > 15
     assert all((folder / "results" / link).is_file() for link in links)

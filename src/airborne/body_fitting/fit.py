@@ -80,13 +80,14 @@ class BodyFit:
 class _Iterate:
     shape: Array  # (k,) see `shape`
     poses: tuple[Pose, ...]
+    body: RenderModel  # of that shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:
     """What is fixed while shape and poses are refined: the images at one reduction, clothes, priors."""
 
-    base: BodyModel  # dressed
+    base: RenderModel  # dressed
     parameters: tuple[ShapeParameter, ...]
     priors: tuple[PosePrior, ...]  # of each observation's pose
     landmarks: tuple[Array, ...]  # (landmarks, 3) per observation
@@ -98,9 +99,9 @@ class _Level:
         """Inverse variances (k,) of the shape about 0."""
         return np.array([parameter.sd for parameter in self.parameters]) ** -2
 
-    def render_model(self, shape: Array) -> RenderModel:
-        """Return the render model of a shape."""
-        return RenderModel.of(apply_shape(self.base, self.parameters, shape))
+    def iterate(self, shape: Array, poses: tuple[Pose, ...]) -> _Iterate:
+        """Prepare a shape and poses for the images."""
+        return _Iterate(shape, poses, self.base.reshape(apply_shape(self.base.model, self.parameters, shape)))
 
     @property
     def landmark_scale(self) -> Array:
@@ -147,39 +148,40 @@ def fit_body(
         nearest = min(range(len(observations)), key=lambda i: abs(observations[i].frames.index - each.frames.index))
         initial += (_pose_from_landmarks(start, each, weights, initial[nearest]),)
     parameters = tuple(each for each in shape_parameters(start) if not girths_alone or each.kind == "girth")
-    state = _Iterate(np.zeros(len(parameters)), initial[: len(observations)])
+    shape, own_poses = np.zeros(len(parameters)), initial[: len(observations)]
     report = progress or (lambda done, total: None)
     for number, px_per_m in enumerate(levels_px_per_m):
         margin_px = max(LEAST_MARGIN_PX, round(_MARGIN_M * px_per_m))
-        current = apply_shape(start, parameters, state.shape[: len(parameters)])
+        current = apply_shape(start, parameters, shape)
         images = [reduce_frames(each.frames, current.with_pose(initial[0]), px_per_m) for each in all_times]
         girth = _MASK_GIRTHS[min(number, len(_MASK_GIRTHS) - 1)]
-        poses = (*state.poses, *initial[len(observations) :])
+        poses = (*own_poses, *initial[len(observations) :])
         background = learn_background(current, images, poses, girth=girth, margin_px=margin_px)
         observed = images[: len(observations)]
-        views = pose_views(current, state.poses, observed)
+        views = pose_views(current, own_poses, observed)
         borders = {} if girths_alone else find_borders(current, views)
         dressed = sample_clothing(with_borders(current, borders), views)
         all_parameters = (*parameters, *border_parameters(current, borders))
-        state = _Iterate(
-            np.append(state.shape[: len(parameters)], np.zeros(len(all_parameters) - len(parameters))), state.poses
-        )
         level = _Level(
-            base=with_borders(start, borders).with_colours(np.array([part.colour for part in dressed.parts])),
+            base=RenderModel.of(
+                with_borders(start, borders).with_colours(np.array([part.colour for part in dressed.parts]))
+            ),
             parameters=all_parameters,
             priors=tuple(PosePrior(pose, _prior_sd(start)) for pose in initial[: len(observations)]),
             landmarks=landmarks,
             weights=np.array([(weights or {}).get(mark.name, 1.0) for mark in model.landmarks]),
-            views=prepare_views(dressed, state.poses, observed, background, margin_px=margin_px),
+            views=prepare_views(dressed, own_poses, observed, background, margin_px=margin_px),
         )
+        state = level.iterate(np.append(shape, np.zeros(len(all_parameters) - len(parameters))), own_poses)
         for step in range(_MOST_STEPS):
             report(number * _MOST_STEPS + step, _MOST_STEPS * len(levels_px_per_m))
             following = _step(level, state)
             if following is None:
                 break
             state = following
+        shape, own_poses = state.shape[: len(parameters)], state.poses
     report(_MOST_STEPS * len(levels_px_per_m), _MOST_STEPS * len(levels_px_per_m))
-    fitted = apply_shape(level.base, level.parameters, state.shape)
+    fitted = state.body.model
     fitted = sample_clothing(fitted, pose_views(fitted, state.poses, observed))
     before = with_borders(start, borders_of(level.parameters, state.shape)), initial[: len(observations)]
     before = sample_clothing(before[0], pose_views(*before, observed)), before[1]
@@ -200,7 +202,7 @@ def fit_body(
 
 def _step(level: _Level, state: _Iterate) -> _Iterate | None:
     """Take a Gauss-Newton step of shape and poses, with backtracking; None where no step gains enough."""
-    here = level.render_model(state.shape)
+    here = state.body
     motion = ShapeMotion.of(here.model, level.parameters)
     freedom, k = all_joints(here.model), len(level.parameters)
     total, systems = NO_MISFIT, []
@@ -240,7 +242,7 @@ def _step(level: _Level, state: _Iterate) -> _Iterate | None:
     objective, share = _objective(level, state, noise), 1.0
     for _ in range(_MOST_BACKTRACKS):
         poses = tuple(freedom.update(pose, share * d) for pose, d in zip(state.poses, pose_deltas, strict=True))
-        tried = _Iterate(state.shape + share * delta, poses)
+        tried = level.iterate(state.shape + share * delta, poses)
         if _objective(level, tried, noise) < objective - _CONVERGED:
             return tried
         share *= _BACKTRACK
@@ -249,7 +251,7 @@ def _step(level: _Level, state: _Iterate) -> _Iterate | None:
 
 def _objective(level: _Level, state: _Iterate, noise: float) -> float:
     """Return the negative log-posterior: images, landmarks and priors."""
-    here = level.render_model(state.shape)
+    here = state.body
     freedom, total = all_joints(here.model), 0.5 * float(level.shape_precision @ state.shape**2)
     for index, (pose, views) in enumerate(zip(state.poses, level.views, strict=True)):
         posed = here.with_pose(pose)

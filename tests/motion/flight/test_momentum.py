@@ -216,7 +216,7 @@ def test_momentum_deviations_are_those_of_sampled_inertias():
     limbs = [replace(segment, name=name, parent="trunk") for segment, name in named]
     model = replace(MODEL, segments=(trunk, *limbs), landmarks=())
     rng, n, sd = np.random.default_rng(6), 400, 0.1
-    motion = motion_of(model, swinging(model, np.arange(8) / 50), covariance=1e-16 * np.eye(model.n_dofs))
+    motion = motion_of(model, swinging(model, np.arange(5) / 50), covariance=1e-16 * np.eye(model.n_dofs))
 
     def sample():
         kinds = 1 + sd * rng.standard_normal(4)[[0, 1, 1, 2, 3]]  # both arms are wrong alike

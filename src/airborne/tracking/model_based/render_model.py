@@ -53,6 +53,11 @@ class RenderModel:
         shapes, axes = new_shapes(flat), _symmetry_axes(model)
         return cls(model, flat, shapes, np.array(owners, np.int16), albedo, is_faceted, axes, lights)
 
+    def reshape(self, model: BodyModel) -> RenderModel:
+        """Prepare the same body in another shape: its colours stay, and its edges between flat sides."""
+        flat = surface_arrays(model)
+        return replace(self, model=model, geometry=flat, shapes=new_shapes(flat), symmetry_axes=_symmetry_axes(model))
+
     @property
     def body(self) -> PackedBody:
         """The body as the kernels take it."""
