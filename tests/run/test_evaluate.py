@@ -13,6 +13,7 @@ from airborne.body.files import read_body
 from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import ResultError
 from airborne.motion import Motion, MotionWriter, write_joints
+from airborne.motion.covariance_file import write_covariances
 from airborne.run.evaluate import assess, evaluate_agreement
 from tests.support.commands import in_process
 from tests.support.motions import estimate
@@ -65,6 +66,16 @@ def test_a_table_that_was_cut_is_refused(run):
     (run / "summary.json").write_text(summary.replace('"n_frames": 1', '"n_frames": 5'))
     with pytest.raises(ResultError, match=r"motion\.csv holds 3 of 5 frames: it was cut"):
         assess(run, None, None, run.parent / "higher.csv")
+
+
+def test_a_run_without_the_errors_that_its_self_check_found_to_last_is_refused(run):
+    summary = (run / "summary.json").read_text()
+    finding = '"self_check": [{"sentence": "the body looks 1 % larger", "is_alarm": false}]'
+    (run / "summary.json").write_text(summary.replace('"n_lost": 0', f'"n_lost": 0, {finding}'))
+    with pytest.raises(ResultError, match=r"lasting\.bin is missing or cut"):
+        assess(run, None, None, run.parent / "higher.csv")
+    write_covariances(run / "lasting.bin", np.broadcast_to(1e-6 * np.eye(6), (3, 6, 6)))
+    assert assess(run, None, None, run.parent / "higher.csv")["joints"].whole.mean_mm == pytest.approx(10)
 
 
 def test_a_truth_of_players_in_millimetres_is_asked_about(tmp_path, capsys):

@@ -12,6 +12,7 @@ from airborne.study.comparison import compare_trials
 from airborne.study.curves import RunCurve, event_times, normalise_time, read_curve
 from airborne.study.random_effects import Cells, estimate_difference
 from airborne.study.spm import compare_curves
+from airborne.study.text import describe_study
 from airborne.study.trials import read_study
 from airborne.study.write import write_comparison
 from tests.support.athletes import write_results
@@ -50,6 +51,14 @@ def test_a_number_is_compared_within_athletes(results):
     half = (contrast.difference.high[0] - contrast.difference.low[0]) / 2
     assert abs(contrast.difference.value[0] - 40) < 2 * half
     assert contrast.p_holm == contrast.difference.p[0] < 0.01
+
+
+def test_of_a_number_that_is_the_same_in_all_trials_no_interval_is_stated(tmp_path):
+    labels = [(athlete, condition) for athlete in ATHLETES for condition in ("dry", "wet")]
+    rows = [{"trial": f"{a}_{c}", "athlete": a, "condition": c, "turns": 1.0, "turns_sd": 0.0} for a, c in labels]
+    compared = compare_trials(read_study(write_results(tmp_path, rows)), "turns", ())
+    text = describe_study([compared], (), real_time=False)
+    assert "wet minus dry is 0 and could not be tested: too few, or all the same; within 5 athletes" in text
 
 
 def test_a_curve_differs_where_it_does(results):

@@ -10,6 +10,7 @@ from airborne.body.files import read_body
 from airborne.errors import ResultError
 from airborne.io.folder_lock import find_writer
 from airborne.io.text import read_json
+from airborne.motion.covariance_file import LASTING_FILE
 from airborne.motion.files import read_motion
 from airborne.motion.motion import Motion
 from airborne.motion.players import PlayersMotion, read_players
@@ -72,13 +73,19 @@ def note_if_unfinished(folder: Path) -> str | None:
 def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
     """Return the motion and the body of the run in a folder, finished or not.
 
-    Raises ResultError if the folder holds none, the body is missing, its record is damaged, or its table was cut.
+    Raises ResultError if the folder holds none, the body is missing, its record is damaged, its table was cut, or the
+    errors that its self-check found to last are missing.
     """
     if not (folder / MOTION).is_file():
         raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
     check_record(folder)
     motion = read_motion(folder / MOTION)
     _refuse_cut_table(folder, MOTION, len(motion))
+    if motion.lasting is None and (folder / SUMMARY).is_file() and read_summary(folder).get("self_check"):
+        raise ResultError(
+            f"{folder / LASTING_FILE} is missing or cut, without which standard deviations are too small; copy it from "
+            "the run, or track again"
+        )
     if not (folder / BODY).is_file():
         raise ResultError(
             f"{folder / 'body.toml'} is missing, the body that was tracked; put the trial's body file there, "

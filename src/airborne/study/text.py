@@ -31,6 +31,8 @@ _LEVELS = {
     "between trials": "between the trials of one athlete, and so of that athlete only",
 }
 
+_NOT_TESTED = "could not be tested: too few, or all the same"
+
 
 def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[str], *, real_time: bool) -> str:
     """Return a methods paragraph, one of results, what was left out, and the references."""
@@ -102,10 +104,12 @@ def _results(comparison: VariableComparison) -> list[str]:
 
 
 def _number(contrast: Contrast, comparison: VariableComparison) -> str:
-    difference = contrast.difference
+    difference, level = contrast.difference, _describe_level(contrast, comparison)
+    if contrast.p_holm is None or not np.isfinite(contrast.p_holm):
+        return f"{contrast.b} minus {contrast.a} is {difference.value[0]:.4g} and {_NOT_TESTED}; {level}."
     return (
         f"{contrast.b} minus {contrast.a} {difference.value[0]:.4g}, 95 % interval {difference.low[0]:.4g} to "
-        f"{difference.high[0]:.4g}, {_format_p(contrast.p_holm)}; {_describe_level(contrast, comparison)}."
+        f"{difference.high[0]:.4g}, {_format_p(contrast.p_holm)}; {level}."
     )
 
 
@@ -114,7 +118,7 @@ def _curve(contrast: Contrast, comparison: VariableComparison) -> str:
     assert test is not None and axis is not None, "a curve has a test"
     level = _describe_level(contrast, comparison)
     if not np.isfinite(test.threshold):
-        return f"{contrast.b} minus {contrast.a} could not be tested: too few, or all the same; {level}."
+        return f"{contrast.b} minus {contrast.a} {_NOT_TESTED}; {level}."
     if not test.clusters:
         return f"{contrast.b} and {contrast.a} do not differ anywhere, |t| below {test.threshold:.3g}; {level}."
     nodes = np.arange(len(axis))
