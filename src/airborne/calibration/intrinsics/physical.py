@@ -190,15 +190,9 @@ def parameter_covariance(pinhole: Pinhole, model: PinholeModel, world: Array, px
 
     `(J^T J)^-1 s^2` with `s^2 = |residual|^2 / (2 n - n_parameters)`.
     """
-    residual = _residual_of_step(pinhole, model, world, px)
-    widths = {"focal_px": 1e-3, "u0_px": 1e-3, "v0_px": 1e-3}
-    columns = []
-    for i, name in enumerate(parameter_names(model)):
-        step = np.zeros(model.n_parameters)
-        step[i] = widths.get(name, 1e-6)
-        columns.append((residual(step) - residual(-step)) / (2 * step[i]))
-    jacobian = np.column_stack(columns)
-    variance = np.sum(residual(np.zeros(model.n_parameters)) ** 2) / (px.size - model.n_parameters)
+    n = model.n_parameters
+    residual, jacobian = pinhole.px_from_world(world) - px, _slopes_of_step(pinhole, model, world)(np.zeros(n))
+    variance = np.sum(residual**2) / (px.size - n)
     scale = np.linalg.norm(jacobian, axis=0)
     inverse = np.linalg.pinv(jacobian / scale)
     return variance * (inverse @ inverse.T) / np.outer(scale, scale)

@@ -11,8 +11,9 @@ from airborne.calibration.intrinsics.physical import Pinhole, PinholeModel
 from airborne.types import Array
 
 _MOST_ITERATIONS = 40  # of a fit, as of `fit_pinhole`; from the fit to all points most end after three
-_FIRST_DAMPING, _DAMPING_FACTOR = 1e-3, 10.0  # of equations whose diagonal is 1 (Marquardt 1963)
-_CONVERGED = 1e-10  # share of the squared error that a further step would gain
+# of equations whose diagonal is 1, as Marquardt 1963; near the end of the fit to all points a whole step is best
+_FIRST_DAMPING, _DAMPING_FACTOR = 1e-7, 10.0
+_CONVERGED = 1e-8  # share of the squared error that a further step would gain: 0.001 sds of a hundred points
 
 
 def refit_pinholes(
