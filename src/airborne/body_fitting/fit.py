@@ -181,8 +181,7 @@ def fit_body(
             state = following
         shape, own_poses = state.shape[: len(parameters)], state.poses
     report(_MOST_STEPS * len(levels_px_per_m), _MOST_STEPS * len(levels_px_per_m))
-    fitted = state.body.model
-    fitted = sample_clothing(fitted, pose_views(fitted, state.poses, observed))
+    fitted = sample_clothing(state.body.model, pose_views(state.body.model, state.poses, observed))
     before = with_borders(start, borders_of(level.parameters, state.shape)), initial[: len(observations)]
     before = sample_clothing(before[0], pose_views(*before, observed)), before[1]
     lights = compare_fits(before, (fitted, state.poses), observed, background)

@@ -152,7 +152,7 @@ def _refine_focal_lengths(misfit: Callable[[Array], float], focal: Array, unknow
 
     n = len(unknown)
     simplex = np.vstack([np.zeros(n), 0.1 * np.eye(n)])
-    # to a hundredth: all is fitted once more, and on synthetic wands a thousandth changed nothing but the time
+    # to a hundredth: all is fitted once more, of ten synthetic wands to the same cameras as after a thousandth
     options = {"maxfev": 40 * n, "xatol": 1e-2, "fatol": 1e-3, "initial_simplex": simplex}
     minimum = minimize(lambda logs: misfit(scale_focals(logs)), np.zeros(n), method="Nelder-Mead", options=options)
     return scale_focals(np.clip(minimum.x, -0.3, 0.3))

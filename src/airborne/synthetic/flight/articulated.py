@@ -102,9 +102,8 @@ def fly_articulated(
         times, back = np.unique(time_s[selected], return_inverse=True)
         if len(times):
             order = slice(None, None, 1 if times[-1] > 0 else -1)
-            quaternions[selected] = _integrate(turning_between, start, joints.x, times[order], tolerance=tolerance)[
-                order
-            ][back]
+            flown = _integrate(turning_between, start, joints.x, times[order], tolerance=tolerance)
+            quaternions[selected] = flown[order][back]
     R = Rotation.from_quat(quaternions).as_matrix()
     angles, rates = _state(joints, time_s)
     t = time_s[:, None]
