@@ -3,6 +3,7 @@
 import io
 import re
 import zipfile
+from functools import cache
 
 NUMBER = re.compile(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
 WORD = re.compile(rb"[A-Za-z_]{2,}")
@@ -111,6 +112,7 @@ def bomb(data, rng):
     )
 
 
+@cache
 def npz_bombs():
     """A pickle, an array that declares itself huge, one that unpacks to gigabytes, one with a broken header."""
 
@@ -123,12 +125,14 @@ def npz_bombs():
         return text.getvalue()
 
     shape = b"{'descr': '%s', 'fortran_order': False, 'shape': (%s), }\n"
-    yield packed(shape % (b"|O", b"3,"), b"\x80\x04cos\nsystem\n.")
-    yield packed(shape % (b"<f8", b"100000, 26, 30000"))
-    yield packed(shape % (b"<f8", b"1000, 26, 3"), bytes(3_000_000))
-    yield packed(b"{'descr': (((((")
-    yield packed(shape % (b"<U9", b"3, 26, 3"), bytes(10_000))
-    yield packed(shape % (b"<f8", b"-3, 26, -3"), bytes(10_000))
+    return (
+        packed(shape % (b"|O", b"3,"), b"\x80\x04cos\nsystem\n."),
+        packed(shape % (b"<f8", b"100000, 26, 30000")),
+        packed(shape % (b"<f8", b"1000, 26, 3"), bytes(3_000_000)),
+        packed(b"{'descr': ((((("),
+        packed(shape % (b"<U9", b"3, 26, 3"), bytes(10_000)),
+        packed(shape % (b"<f8", b"-3, 26, -3"), bytes(10_000)),
+    )
 
 
 MUTATORS = [flipped, cut, hole, doubled, shuffled, renumbered, renumbered, reworded, reworded, nested, lengthened]
