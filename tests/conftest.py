@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import warnings
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -45,11 +46,18 @@ def pytest_configure(config):
     config.option.loadscopereorder = False  # workers take the files in the order below, not those of most tests first
 
 
+@cache
+def skipped_before(config):
+    """Return what the last run skipped."""
+    return frozenset(config.cache.get(SKIPPED, []))
+
+
 def pytest_ignore_collect(collection_path, config):
     """Read no file of which nothing was skipped, where only that is run."""
     if config.getoption("skipped") and collection_path.suffix == ".py":
-        files = {node.split("::")[0] for node in config.cache.get(SKIPPED, [])}
-        return collection_path.relative_to(config.rootpath).as_posix() not in files or None
+        file = collection_path.relative_to(config.rootpath).as_posix()
+        if not any(node.startswith(f"{file}::") for node in skipped_before(config)):
+            return True
     return None
 
 
@@ -63,7 +71,7 @@ def pytest_collection_modifyitems(config, items):
         if item.location[0] not in seconds:
             item.add_marker("quick")
     if config.getoption("skipped"):
-        skipped = set(config.cache.get(SKIPPED, []))
+        skipped = skipped_before(config)
         config.hook.pytest_deselected(items=[item for item in items if item.nodeid not in skipped])
         items[:] = [item for item in items if item.nodeid in skipped]
 

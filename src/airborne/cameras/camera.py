@@ -25,6 +25,12 @@ def scale_lengths(covariance: Array, factor: float) -> Array:
     return covariance * np.outer(sizes, sizes)
 
 
+def correlation(covariance: Array) -> tuple[Array, Array]:
+    """Return standard deviations (n,) and the symmetric correlation matrix (n, n) of a covariance."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    return sd, (covariance + covariance.T) / 2 / sd[:, None] / sd
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Camera:
     """A pinhole camera with distortion: x right, y down, z forward; pixel centres at whole numbers.

@@ -80,8 +80,9 @@ def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
         raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
     check_record(folder)
     motion = read_motion(folder / MOTION)
-    _refuse_cut_table(folder, MOTION, len(motion))
-    if motion.lasting is None and (folder / SUMMARY).is_file() and read_summary(folder).get("self_check"):
+    summary = _summary_if_finished(folder)
+    _refuse_cut_table(folder / MOTION, len(motion), summary)
+    if motion.lasting is None and summary.get("self_check"):
         raise ResultError(
             f"{folder / LASTING_FILE} is missing or cut, without which standard deviations are too small; copy it from "
             "the run, or track again"
@@ -98,15 +99,20 @@ def read_players_run(folder: Path) -> PlayersMotion:
     """Return the motion of the run of players in a folder. Raises ResultError as `read_body_run` does."""
     check_record(folder)
     motion = read_players(folder / JOINTS)
-    _refuse_cut_table(folder, JOINTS, len(motion))
+    _refuse_cut_table(folder / JOINTS, len(motion), _summary_if_finished(folder))
     return motion
 
 
-def _refuse_cut_table(folder: Path, table: str, n: int) -> None:
-    """Raise ResultError where a table has fewer frames than the run's summary, if it is finished, counts."""
-    n_whole = read_summary(folder)["n_frames"] if (folder / SUMMARY).is_file() else n
+def _summary_if_finished(folder: Path) -> dict[str, Any]:
+    """Read a run's summary; empty where it is not finished."""
+    return read_summary(folder) if (folder / SUMMARY).is_file() else {}
+
+
+def _refuse_cut_table(table: Path, n: int, summary: dict[str, Any]) -> None:
+    """Raise ResultError where a table has fewer frames than its run's summary, if there is one, counts."""
+    n_whole = summary.get("n_frames")
     if isinstance(n_whole, int) and n < n_whole:
-        raise ResultError(f"{folder / table} holds {n} of {n_whole} frames: it was cut; copy the folder or track again")
+        raise ResultError(f"{table} holds {n} of {n_whole} frames: it was cut; copy the folder or track again")
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

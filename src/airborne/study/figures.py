@@ -13,6 +13,7 @@ from airborne.export import panels
 from airborne.export.page import label
 from airborne.io.figures import save_png
 from airborne.study.comparison import Contrast, VariableComparison
+from airborne.study.spm import format_p
 from airborne.types import Array
 
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
@@ -73,7 +74,7 @@ def _draw_test(axes: Axes, axis: Array, contrast: Contrast) -> None:
         axes.axvspan(ends[0], ends[1], color=_COLOURS[1], alpha=0.15, linewidth=0)
         at = float(np.mean(ends))
         axes.annotate(
-            _format_p(p), (at, 0.02), xycoords=("data", "axes fraction"), ha="center", fontsize=panels.FONT_PT - 1
+            format_p(p), (at, 0.02), xycoords=("data", "axes fraction"), ha="center", fontsize=panels.FONT_PT - 1
         )
     panels.label_panel(axes, "SPM{t}")
 
@@ -130,7 +131,3 @@ def _numbers(comparison: VariableComparison) -> Figure:
 
 def _colour(k: int) -> str:
     return _COLOURS[k % len(_COLOURS)]
-
-
-def _format_p(p: float) -> str:
-    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"

@@ -24,7 +24,7 @@ Level = Literal["within athletes", "between athletes", "between trials"]  # what
 
 _FEWEST = 2  # athletes, or trials of a single athlete
 _LEAST = 1e-30  # variance that a weight may come from
-_HALVINGS = 60  # of what brackets the variance between athletes
+_HALVINGS = 60  # of what brackets the variance between athletes: more than the 53 bits of a number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

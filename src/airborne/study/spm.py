@@ -29,6 +29,11 @@ class CurveTest:
     clusters: tuple[tuple[float, float, float], ...]  # first and last node, p
 
 
+def format_p(p: float) -> str:
+    """Return a p-value as studies print it."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
+
+
 def check_spm1d() -> None:
     """Raise AirborneError where *spm1d* is not installed."""
     try:

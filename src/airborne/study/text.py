@@ -9,6 +9,7 @@ import numpy as np
 from airborne import __version__
 from airborne.errors import count
 from airborne.study.comparison import ALPHA, Contrast, VariableComparison
+from airborne.study.spm import format_p
 
 _REFERENCES = {
     "random effects": (
@@ -104,12 +105,13 @@ def _results(comparison: VariableComparison) -> list[str]:
 
 
 def _number(contrast: Contrast, comparison: VariableComparison) -> str:
-    difference, level = contrast.difference, _describe_level(contrast, comparison)
-    if contrast.p_holm is None or not np.isfinite(contrast.p_holm):
+    difference, level, p = contrast.difference, _describe_level(contrast, comparison), contrast.p_holm
+    assert p is not None, "a number has one"
+    if not np.isfinite(p):
         return f"{contrast.b} minus {contrast.a} is {difference.value[0]:.4g} and {_NOT_TESTED}; {level}."
     return (
         f"{contrast.b} minus {contrast.a} {difference.value[0]:.4g}, 95 % interval {difference.low[0]:.4g} to "
-        f"{difference.high[0]:.4g}, {_format_p(contrast.p_holm)}; {level}."
+        f"{difference.high[0]:.4g}, {format_p(p)}; {level}."
     )
 
 
@@ -123,7 +125,7 @@ def _curve(contrast: Contrast, comparison: VariableComparison) -> str:
         return f"{contrast.b} and {contrast.a} do not differ anywhere, |t| below {test.threshold:.3g}; {level}."
     nodes = np.arange(len(axis))
     spans = [
-        f"from {np.interp(low, nodes, axis):.3g} to {np.interp(high, nodes, axis):.3g} ({_format_p(p)})"
+        f"from {np.interp(low, nodes, axis):.3g} to {np.interp(high, nodes, axis):.3g} ({format_p(p)})"
         for low, high, p in test.clusters
     ]
     return (
@@ -137,9 +139,3 @@ def _describe_level(contrast: Contrast, comparison: VariableComparison) -> str:
     level = contrast.difference.level
     n = count(len(a), "athlete") if level == "within athletes" else f"{len(a)} and {len(b)}"
     return _LEVELS[level].format(n)
-
-
-def _format_p(p: float | None) -> str:
-    if p is None or not np.isfinite(p):
-        return "p unknown"
-    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"

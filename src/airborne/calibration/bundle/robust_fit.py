@@ -27,8 +27,9 @@ from airborne.geometry.descent import Descent, NielsenRule, Outcome, descend
 from airborne.types import Array, Ints
 
 _MOST_STEPS, _MOST_SCALINGS = 200, 12  # of the iteration; changes of scale between whole iterations, at most
-LEAST_DECREASE = 1e-5  # [nat] predicted decrease of the cost below which the iteration stops: 0.004 sds from the end
-_LEAST_SHARE = 1e-10  # the same as a share of the cost: rounding
+# predicted decrease of the cost below which the iteration stops: in nat, chosen as 0.004 sds from the end; as a share
+# of the cost, chosen between rounding, 1e-16, and what shows
+LEAST_DECREASE, _LEAST_SHARE = 1e-5, 1e-10
 _SAME_NOISE = 0.01  # relative change of the noise below which it is settled
 _DAMPING = NielsenRule(first=1e-3, least=1e-12, most=1e8, least_factor=1 / 10)
 _LEAST_SCALE = 1e-6  # of a source's noise, in its assumed standard deviations
@@ -64,7 +65,7 @@ class RobustFit:
     prior: CameraPrior | None
     loss: Loss
     progress: Callable[[int, float], None] | None
-    least_decrease: float = LEAST_DECREASE  # [nat]
+    least_decrease: float  # [nat]
 
     def run(self, is_known: NDArray[np.bool_]) -> tuple[State, Noise, Outcome]:
         """Return the best state, the sources' noise, and why the last descent ended."""

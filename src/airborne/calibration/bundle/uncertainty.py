@@ -12,7 +12,7 @@ from airborne.calibration.bundle.equations import Jacobian, NormalEquations, cam
 from airborne.calibration.bundle.layout import Layout
 from airborne.calibration.bundle.loss import Loss, loss_constants
 from airborne.calibration.bundle.problem import Problem, State
-from airborne.cameras.camera import Rig
+from airborne.cameras.camera import Rig, correlation
 from airborne.types import Array
 
 _MOST_ROWS_AT_ONCE = 200  # rows whose leverage is computed together
@@ -74,8 +74,8 @@ class Uncertainty:
 
 def _without_rounding(covariance: Array) -> Array:
     """Return the nearest covariance (n, n): symmetric, and without variances below zero in any direction."""
-    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 / sd[:, None] / sd)
+    sd, correlations = correlation(covariance)
+    values, vectors = np.linalg.eigh(correlations)
     return (vectors * np.maximum(values, 0.0)) @ vectors.T * sd[:, None] * sd
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +34,9 @@ LENS_MODELS: dict[Lens, tuple[tuple[str, FreeParameters], ...]] = {
         ("focal + principal point + k1 to k4", FreeParameters(extrinsics=False, principal_point=True, n_terms=4)),
     ),
 }
-# [nat] of a fit to a few views: about 0.2 sds from its end, where held-out errors of a recorded board are the same to
-# 0.3 %, those of a model that overfits apart; a lens is an initial value, and fitted once more with all else
-_LEAST_DECREASE = 1e-2
+# a lens is an initial value, and fitted once more with all else. Chosen of 1e-5, 1e-3 and 1e-2 nat: about 0.2 sds from
+# the end, where held-out errors of a recorded board are the same to 0.3 %, those of a model that overfits apart
+_adjust = partial(adjust, least_decrease=1e-2)
 _N_FOLDS = 3  # parts of the views, each left out once
 _MOST_VIEWS = 30  # views that decide; more take longer and change nothing
 _FEWEST_POINTS, _LEAST_FLATNESS = 20, 0.05  # control points of a lens, and their thickness over extent
@@ -73,7 +74,7 @@ def choose_lens(
     scores, fits = {}, {}
     models = LENS_MODELS[lens] if n >= _FEWEST_TO_CHOOSE else LENS_MODELS[lens][1:2]
     for name, free in models:
-        fit = adjust(Rig((camera,)), [board_source(views, boards)], free, least_decrease=_LEAST_DECREASE)
+        fit = _adjust(Rig((camera,)), [board_source(views, boards)], free)
         camera, boards = fit.rig.cameras[0], fit.sources[0].world_from_target or boards
         fits[name] = fit
         if n >= _FEWEST_TO_CHOOSE:
@@ -125,10 +126,9 @@ def _cross_validate(fit: Adjustment, fold: NDArray[np.integer]) -> Array:
     score = np.zeros(len(fold))
     for k in range(_N_FOLDS):
         is_held_out = fold[source.moments] == k
-        fitted = adjust(fit.rig, [source.select(~is_held_out)], fit.free, least_decrease=_LEAST_DECREASE)
+        fitted = _adjust(fit.rig, [source.select(~is_held_out)], fit.free)
         held_out = source.select(is_held_out)
-        posed = adjust(fitted.rig, [held_out], ALL_FIXED, least_decrease=_LEAST_DECREASE)
-        squares = np.sum(posed.residual_px[0] ** 2, axis=1)
+        squares = np.sum(_adjust(fitted.rig, [held_out], ALL_FIXED).residual_px[0] ** 2, axis=1)
         for m in np.flatnonzero(fold == k):
             score[m] = np.sqrt(np.nanmean(squares[held_out.moments == m]))
     return score

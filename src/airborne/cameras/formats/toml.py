@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from airborne.cameras.camera import Camera, scale_lengths
+from airborne.cameras.camera import Camera, correlation, scale_lengths
 from airborne.cameras.formats.parsing import build_camera, distortion_terms, parse_array, parse_size
 from airborne.errors import CalibrationError
 
@@ -44,8 +44,7 @@ def errors_from_table(where: str, table: dict, metres: float) -> dict[str, Any]:
     if "covariance" not in table:
         return {}
     covariance = scale_lengths(parse_array(where, "covariance", table["covariance"], (7, 7)), metres)
-    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
-    values = np.linalg.eigvalsh((covariance + covariance.T) / 2 / sd[:, None] / sd)
+    values = np.linalg.eigvalsh(correlation(covariance)[1])
     if not np.allclose(covariance, covariance.T, rtol=1e-6, atol=1e-12) or values[0] < -_ROUNDING:
         raise CalibrationError(f"{where}: covariance is no covariance matrix; leave it out")
     shift_px = float(parse_array(where, "shift_sd_px", table.get("shift_sd_px", 0.0), ()))

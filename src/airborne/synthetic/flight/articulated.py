@@ -24,7 +24,9 @@ from airborne.synthetic.flight.rigid import MassProperties, SampledFlight
 from airborne.types import Array
 
 Rate = Callable[[float, Array], Array]  # time and state to the state's rate
-_N_NODES = 64  # between two breaks: with every joint going through its range, a mass distribution to 1e-14 of itself
+# between two breaks; chosen of 24 to 64: with every joint going through its range, a mass distribution is interpolated
+# to 1e-14 of itself
+_N_NODES = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,8 +93,7 @@ def fly_articulated(
 
         def turning(t: float, q: Array) -> Array:
             now = mass(t)
-            own = takeoff.angular_momentum @ _matrix(q) - now[9:]
-            return _quaternion_rate(q, np.linalg.solve(now[:9].reshape(3, 3), own))
+            return _quaternion_rate(q, _angular_velocity(_matrix(q), takeoff, now[:9].reshape(3, 3), now[9:]))
 
         return turning
 
@@ -109,7 +110,7 @@ def fly_articulated(
     t = time_s[:, None]
     centre = takeoff.centre + takeoff.velocity * t + FREE_FALL_M_S2 * t**2 / 2
     shape = segments.mass_distribution(angles, rates)
-    w = segments.angular_velocity(R, takeoff, angles, rates)
+    w = _angular_velocity(R, takeoff, shape.inertia, shape.momentum)
     spin = np.einsum("nij,nj->ni", shape.inertia, w) + shape.momentum
     return SampledFlight(
         time_s=time_s,
@@ -196,11 +197,14 @@ class _Segments:
         values = np.column_stack([shape.inertia.reshape(_N_NODES, 9), shape.momentum])
         return BarycentricInterpolator(nodes, values, wi=weights)
 
-    def angular_velocity(self, R: Array, takeoff: Takeoff, angles: Array, rates: Array) -> Array:
-        """Return the root's angular velocity (n, 3) in its own frame [rad/s], from R (n, 3, 3) world from root."""
-        shape = self.mass_distribution(angles, rates)
-        own = np.einsum("...ji,j->...i", R, takeoff.angular_momentum) - shape.momentum
-        return np.linalg.solve(shape.inertia, own[..., None])[..., 0]
+
+def _angular_velocity(R: Array, takeoff: Takeoff, inertia: Array, momentum: Array) -> Array:
+    """Return the root's angular velocity (..., 3) in its own frame [rad/s], from R (..., 3, 3) world from root.
+
+    inertia (..., 3, 3), momentum (..., 3): as `MassDistribution` has them.
+    """
+    own = takeoff.angular_momentum @ R - momentum
+    return np.linalg.solve(inertia, own[..., None])[..., 0]
 
 
 def _integrate(
