@@ -80,7 +80,10 @@ def require_choice(value: str, choices: Collection[str], what: str) -> None:
 _PLAIN = {
     "extra_forbidden": "unknown key",
     "float_parsing": "expected a number",
+    "float_type": "expected a number",
+    "int_from_float": "expected a whole number",
     "int_parsing": "expected a whole number",
+    "int_type": "expected a whole number",
     "bool_type": "expected true or false",
 }
 _BOUNDS = {  # pydantic's kinds of error: where it keeps the bound, and how it is said

@@ -152,6 +152,25 @@ def test_a_mask_after_the_end_is_noted(folder):
     assert "note: [[mask]] of cam1 begins at frame 500, after the recording's end" in check_trial(path).well
 
 
+def test_a_stop_past_the_end_is_noted(folder):
+    path = edit(folder, ('method = "refined"', 'method = "refined"\nstop = 34'))
+    assert not any("lies past the end" in line for line in check_trial(path).well)
+    path = edit(folder, ("stop = 34", "stop = 3000"))
+    assert "note: track.stop = 3000 lies past the end: the last frame is 33" in check_trial(path).well
+
+
+def test_a_number_as_text_a_part_of_a_frame_and_a_switch_as_a_number_are_refused(folder):
+    path = edit(
+        folder,
+        ('method = "refined"', 'method = "refined"\nstop = "12"\nevery = 1.0\nwhole_run = 1'),
+        ("position_m = [-0.42419, -0.01495", 'position_m = [-0.42419, "-0.01495"'),
+    )
+    asked = {"track.stop": "a whole number (found '12')", "track.every": "a whole number (found 1.0)",
+             "track.whole_run": "true or false (found 1)", "start.position_m, value 2": "a number (found '-0.01495')"}  # fmt: skip
+    mistakes = check_trial(path).mistakes
+    assert sorted(mistakes) == sorted(f"trial.toml: {key}: expected {text}" for key, text in asked.items())
+
+
 def test_lines_are_reported_as_they_are_found(folder):
     reported = []
     assert reported == [] and check_trial(folder / "trial.toml", reported.append).well == reported

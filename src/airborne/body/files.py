@@ -38,7 +38,7 @@ _LARGEST_KG_M2 = 1e6  # of a moment of inertia: a typing error beyond it
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class _PartTable(_Strict):

@@ -75,6 +75,9 @@ def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opene
         lazy=fields_as == "rows",
     )
     recording.events.extend(cameras.notes)
+    n, stop = recording.n_images, trial.track.stop
+    if n is not None and stop is not None and stop > n:
+        recording.events.append(f"track.stop = {stop} lies past the end: the last frame is {n - 1}")
     return Opened(recording, cameras.calibration, cameras.detections)
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from airborne.io.names import CheckedPath, Name
-from airborne.trial.table import SettingsTable
+from airborne.trial.table import Pixel, SettingsTable
 
 
 class CameraTable(SettingsTable):
@@ -22,4 +22,4 @@ class CameraTable(SettingsTable):
     exposure_s: float = Field(0.0, ge=0, le=0.1)  # of each image, about its time; 0: short, or unknown
     calibrated_as: str | None = None  # the camera's name in the calibration file, where it differs
     saved_scale: float = Field(1.0, gt=0)  # calibration px = saved_scale * video px + saved_offset_px
-    saved_offset_px: Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+    saved_offset_px: Pixel = [0.0, 0.0]

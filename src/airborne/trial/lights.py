@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from airborne.rendering import Lamp, Lights
-from airborne.trial.table import SettingsTable, Switch, Vector
+from airborne.trial.table import SettingsTable, Vector
 
 
 class LampTable(SettingsTable):
@@ -34,7 +34,7 @@ class LightsTable(SettingsTable):
     """Measured lights; without this table the light is unknown."""
 
     ambient: float = Field(ge=0)
-    is_exact: Switch = False  # rendered images: their light is exactly this, so that every method uses it
+    is_exact: bool = False  # rendered images: their light is exactly this, so that every method uses it
     lamp: list[LampTable] = []
 
     @property

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 from scipy.spatial.transform import Rotation
 
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.io.names import CheckedPath
-from airborne.trial.table import ClickTable, SettingsTable, Vector
+from airborne.trial.table import ClickTable, Matrix, Quaternion, SettingsTable, Vector
 
 BY_HAND = frozenset(
     {"position_m", "rotation_matrix", "quaternion_xyzw", "somersault_tilt_twist_deg", "joint_angles_deg"}
@@ -23,8 +21,8 @@ class PoseForms(SettingsTable):
     """A body at a frame: a pose by hand, positions or clicked pixels of its landmarks, or detections of a network."""
 
     position_m: Vector | None = None
-    rotation_matrix: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = None
-    quaternion_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
+    rotation_matrix: Matrix | None = None
+    quaternion_xyzw: Quaternion | None = None
     somersault_tilt_twist_deg: Vector | None = None
     joint_angles_deg: dict[str, Vector] = {}  # segment -> x, y, z
     joints_m: dict[str, Vector] | CheckedPath | None = None  # landmark -> position, or a table of them

@@ -16,9 +16,9 @@ from airborne.tracking.particle.bootstrap import ResampleWhen
 from airborne.tracking.particle.resampling import Scheme
 from airborne.tracking.particle.settings import EstimateAs, ViewsAs
 from airborne.tracking.particle.swing import Swing
-from airborne.trial.table import SettingsTable, Switch
+from airborne.trial.table import SettingsTable
 
-StepSizes = list[Annotated[float, Field(gt=0)]]
+StepSizes = Annotated[list[Annotated[float, Field(gt=0)]], Field(strict=False)]
 CapsuleMethod = Literal["blocker"]
 Overlay = Literal["paper", "broadcast"]
 Directions = Literal["both", "forward"]
@@ -60,8 +60,8 @@ class BodySettings(_Settings):
     start: Annotated[int, Field(ge=0)] | None = None  # the first frame or field; before start.frame, tracked backward
     prediction: Prediction = "smooth"
     directions: Directions = "both"  # between [[key]] tables, and of people; or forward alone
-    whole_run: Switch = True  # refined: fit a person's poses of all frames once more, all at once
-    fixed_shape: Switch = False  # joint angles stay those of the start; stepping and simplex never change them
+    whole_run: bool = True  # refined: fit a person's poses of all frames once more, all at once
+    fixed_shape: bool = False  # joint angles stay those of the start; stepping and simplex never change them
     colour: ScoreName = "normalised"  # stepping and simplex: paper B's score
     v_rule: VRule = "v_sym"  # stepping
     steps_mm: StepSizes = [50, 30, 20, 10, 10, 5, 5]  # stepping: one loop each
@@ -130,8 +130,8 @@ class ParticleSettings(_Settings):
     swing: Swing = "literal"  # block-jump: how rods swing
     estimate: EstimateAs | None = None  # None: the method's own
     views: ViewsAs = "all"  # which cameras count
-    tempered: Switch = False  # a softer comparison of histograms, the more cameras
-    torso_shift: Switch = False  # the whole body moves along with the torso
+    tempered: bool = False  # a softer comparison of histograms, the more cameras
+    torso_shift: bool = False  # the whole body moves along with the torso
     resample: Scheme = "systematic"
     resample_when: ResampleWhen = "always"
     torso: CheckedPath | None = None  # a table of torsos; None: they are tracked

@@ -11,7 +11,6 @@ from airborne.body import Pose
 from airborne.errors import TrialError
 from airborne.trial.players import PlayerTable
 from airborne.trial.pose_forms import BY_HAND, PoseForms
-from airborne.trial.table import Switch
 
 ONLY_BYSTANDERS = "every player is a bystander; give one of them the points of the legs too"
 
@@ -19,8 +18,8 @@ ONLY_BYSTANDERS = "every player is a bystander; give one of them the points of t
 class StartTable(PoseForms):
     """The first pose: set by hand, or found from positions of the body's landmarks; or those of several players."""
 
-    find: Switch = False  # the body, or the players, are looked for, from `frame` on
-    near_net: Switch = True  # of players that are looked for: those at the net alone
+    find: bool = False  # the body, or the players, are looked for, from `frame` on
+    near_net: bool = True  # of players that are looked for: those at the net alone
     frame: Annotated[int, Field(ge=0)] = 0
     player: list[PlayerTable] = []
 

@@ -18,7 +18,7 @@ PixelConventionName = Literal["upper-left-1", "upper-left-0", "lower-left-1", "l
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class CameraSource(_Strict):
