@@ -2,10 +2,13 @@
 
 import re
 import shutil
+from dataclasses import replace
 
 import av
 import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.cameras import Rig, read_rig, write_rig
 from airborne.cli import main
 from airborne.errors import MistakesError, ResultError
 from airborne.run.check import check_trial
@@ -165,10 +168,26 @@ def test_a_number_as_text_a_part_of_a_frame_and_a_switch_as_a_number_are_refused
         ('method = "refined"', 'method = "refined"\nstop = "12"\nevery = 1.0\nwhole_run = 1'),
         ("position_m = [-0.42419, -0.01495", 'position_m = [-0.42419, "-0.01495"'),
     )
-    asked = {"track.stop": "a whole number (found '12')", "track.every": "a whole number (found 1.0)",
-             "track.whole_run": "true or false (found 1)", "start.position_m, value 2": "a number (found '-0.01495')"}  # fmt: skip
+    asked = {
+        "track.stop": "a whole number (found '12')",
+        "track.every": "a whole number (found 1.0)",
+        "track.whole_run": "true or false (found 1)",
+        "start.position_m, value 2": "a number (found '-0.01495')",
+    }
     mistakes = check_trial(path).mistakes
     assert sorted(mistakes) == sorted(f"trial.toml: {key}: expected {text}" for key, text in asked.items())
+
+
+def test_a_camera_that_is_turned_away_from_the_start_is_noted(folder):
+    rig = read_rig(folder / "calib_true.toml")
+    cam1, cam2, cam3 = rig
+    turn = RigidTransform.from_rotation(Rotation.from_rotvec([0, 1.0, 0]))
+    write_rig(
+        folder / "calib_true.toml", Rig((cam1, replace(cam2, camera_from_world=turn * cam2.camera_from_world), cam3))
+    )
+    note = "note: the start pose lies outside the image of cam2; where it should show, check the calibration"
+    checks = check_trial(folder / "trial.toml")
+    assert note in checks.well and not checks.mistakes
 
 
 def test_lines_are_reported_as_they_are_found(folder):

@@ -31,7 +31,7 @@ from airborne.run.body_passes import BodyPasses
 from airborne.run.body_tables import write_tables
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart
-from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, is_seen
+from airborne.run.first_pose import find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
@@ -120,8 +120,9 @@ class BodyRun:
                 seen = replace(self, model=sample_body_colours(self.model, found.pose, first, notes.append))
                 seen = seen._fit_shape(first)
         self.recording.events.extend(notes)
-        if not is_seen(seen.model.with_pose(self.start), [view.camera for view in first.views if view is not None]):
-            self.recording.events.append(OUT_OF_SIGHT)
+        cameras = [view.camera for view in first.views if view is not None]
+        if unseen := out_of_sight(seen.model.with_pose(self.start), cameras):
+            self.recording.events.append(unseen)
         return seen
 
     def _fit_shape(self, first: Frames) -> BodyRun:

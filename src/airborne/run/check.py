@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from airborne.errors import AirborneError, MistakesError, TrialError, count
 from airborne.run.detections import read_trial_detections
-from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, is_seen
+from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source
@@ -149,9 +149,12 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda: find_first_pose(trial, model, recording.rig, opened.detections),
             lambda first: "; ".join([f"start: frame {trial.start.frame}", *first.notes]),
         )
-        if first is not None and not is_seen(model.with_pose(first.pose), recording.rig):
-            checks.mistakes.append(f"{trial.name}: {OUT_OF_SIGHT}")
+        unseen = out_of_sight(model.with_pose(first.pose), recording.rig) if first is not None else ""
+        if unseen == OUT_OF_SIGHT:
+            checks.mistakes.append(f"{trial.name}: {unseen}")
         elif first is not None:
+            if unseen:
+                checks.add(f"note: {unseen}")
             with start_foregrounds(recording) as foregrounds:
                 checks.attempt(
                     lambda: refuse_mix_ups(recording.rig, foregrounds, model, first.pose),

@@ -55,7 +55,15 @@ def _add_lone_clicks(trial: Trial, model: BodyModel, rig: Rig, first: FirstPose,
     return replace(first, pose=join_evidence(first.pose, sds, evidence), notes=(*first.notes, note))
 
 
-def is_seen(posed: PosedBody, cameras: Iterable[Camera]) -> bool:
-    """Say whether any part of a body lies in a camera's image; lens distortion is left out."""
+def out_of_sight(posed: PosedBody, cameras: Iterable[Camera]) -> str:
+    """Say in which cameras' images no part of a body lies: `OUT_OF_SIGHT` for all; empty where each shows some.
+
+    Lens distortion is left out.
+    """
     surface = surface_arrays(posed.model)
-    return any(render(surface, posed, camera.without_distortion(), FLAT).mask.any() for camera in cameras)
+    seen = {each.name: render(surface, posed, each.without_distortion(), FLAT).mask.any() for each in cameras}
+    if not any(seen.values()):
+        return OUT_OF_SIGHT
+    names = [name for name, is_seen in seen.items() if not is_seen]
+    where = f"the start pose lies outside the image of {', '.join(names)}"
+    return f"{where}; where it should show, check the calibration" if names else ""
