@@ -94,6 +94,14 @@ def test_the_page_runs_from_top_to_bottom(done):
     assert (folder / "results" / "export" / "results.c3d").is_file()
 
 
+def test_what_a_run_holds_is_shown_in_a_line(done):
+    run = ab.read_run(done[0] / "results")
+    assert repr(run.motion) == "<Motion: 12 frames, 12 tracked, 0 uncertain, 0 lost>"
+    assert repr(run.body) == "<BodyModel 'wooden cross': 1 segment, 6 degrees of freedom>"
+    assert repr(run.rig) == "<Rig: cam1, cam2, cam3>"
+    assert re.fullmatch(r"<Camera 'cam1': 768×576 px, focal length 10\d\d.\d px, at .* m>", repr(run.rig.cameras[0]))
+
+
 def test_examples_of_docstrings_run(done, tmp_path, monkeypatch):
     folder, _ = done
     shutil.copytree(THROWN_CROSS, tmp_path, dirs_exist_ok=True)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body.kinematics import chain_segments
 from airborne.body.limits import FREE, JointLimits
-from airborne.errors import BodyError
+from airborne.errors import BodyError, count
 from airborne.geometry.joint_rotations import move_matrix
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.io.names import check_column, check_name
@@ -163,6 +163,9 @@ class BodyModel:
             object.__setattr__(self, "landmarks", origins)
         if not any(segment.parts for segment in self.segments):
             raise BodyError(f"body '{self.name}' has no part to see; add a [[segment.part]]")
+
+    def __repr__(self) -> str:
+        return f"<BodyModel '{self.name}': {count(len(self.segments), 'segment')}, {self.n_dofs} degrees of freedom>"
 
     def _check_names(self) -> None:
         try:

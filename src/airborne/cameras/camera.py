@@ -52,6 +52,11 @@ class Camera:
     covariance: Array | None = None
     world_sd: float | None = None  # of the size of the calibration's world [share]; None: it does not say
 
+    def __repr__(self) -> str:
+        (width, height), (x, y, z) = self.size, self.centre
+        focal_px = f"{self.K[0, 0]:.1f} px"
+        return f"<Camera '{self.name}': {width}×{height} px, focal length {focal_px}, at {x:.3f}, {y:.3f}, {z:.3f} m>"
+
     @property
     def centre(self) -> Array:
         """The camera's position in the world: (3,) [m]."""
@@ -163,6 +168,9 @@ class Rig:
             list(map(check_name, names))
         except ValueError as error:
             raise CalibrationError(f"cameras: {error}") from None
+
+    def __repr__(self) -> str:
+        return f"<Rig: {', '.join(camera.name for camera in self.cameras)}>"
 
     def __len__(self) -> int:
         return len(self.cameras)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
+from airborne.errors import count
 from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Estimate, Status
 from airborne.types import Array
@@ -71,6 +72,11 @@ class Motion:
 
     def __len__(self) -> int:
         return len(self.index)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{self.count(status)} {status}" for status in Status)
+        joints = f" of {count(len(self.joints), 'joint')}" if self.joints else ""
+        return f"<Motion{joints}: {count(len(self), 'frame')}, {counts}>"
 
     def pose(self, row: int | np.integer) -> Pose:
         """Return the pose of one row that has one, bit for bit."""

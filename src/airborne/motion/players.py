@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body.legs import LEG_POINTS
-from airborne.errors import ResultError
+from airborne.errors import ResultError, count
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.io.writing import explain_full_disk
 from airborne.motion.tables import cell
@@ -79,6 +79,9 @@ class PlayersMotion:
 
     def __len__(self) -> int:
         return len(self.index)
+
+    def __repr__(self) -> str:
+        return f"<PlayersMotion: {count(len(self), 'frame')}, {', '.join(self.players)}>"
 
     @property
     def status(self) -> NDArray[np.str_]:
