@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from airborne.errors import ResultError
+from airborne.motion.run_folder import videos_of
+from airborne.motion.smoothing.smoother import Smoothing
+from airborne.run.smooth import smooth_run
 from airborne.run.track import track_trial
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.trial.calibration import CalibrationTable
@@ -74,9 +77,14 @@ def test_frames_between_the_neighbours_of_a_changed_key_are_tracked_again(
 ):
     before, found = poses(run), searched(monkeypatch)
     assert list(before) == list(range(LAST))
+    made = [*smooth_run(run, Smoothing(method="spline")).files, "report.html", "videos/overlay_cam1.mp4"]
+    videos_of(run)
+    for name in made[-2:]:
+        (run / name).write_text("of before")
     changed = cross(key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8))
     summary = track_trial(changed, run, resume=True, pictures=False).summary
     assert found == {1, 2, 3, 4, 5, 6, 7}
+    assert [name for name in made if (run / name).exists()] == []
     after = poses(run)
     assert list(after) == list(range(LAST))
     assert all(after[frame] == before[frame] for frame in (0, *range(8, LAST)))
@@ -95,6 +103,8 @@ def test_frames_between_the_neighbours_of_a_changed_key_are_tracked_again(
 def test_a_key_past_the_last_one_touches_what_follows(cross, thrown_cross, run, monkeypatch):
     found = searched(monkeypatch)
     keys = [key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8), key(thrown_cross, 11)]
+    track_trial(cross(*keys[:2]), run, resume=True, pictures=False)
+    found.clear()
     track_trial(cross(*keys), run, resume=True, pictures=False)
     assert found == {9, 10, 11, 12}
 

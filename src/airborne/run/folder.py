@@ -26,7 +26,7 @@ from airborne.motion.run_folder import (
     CALIBRATION,
     CANDIDATES,
     CANDIDATES_PICTURE,
-    FOLDERS,
+    FIGURES,
     JOINTS,
     JUMPS,
     MOTION,
@@ -34,7 +34,9 @@ from airborne.motion.run_folder import (
     RUN_RECORD,
     SMOOTH_RECORD,
     SUMMARY,
+    TABLES,
     TRACKED_MOTION,
+    VIDEOS,
     read_record,
 )
 from airborne.trial.file import Trial
@@ -59,8 +61,8 @@ def prepare_folder(
 
     Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not.
     A run of one body that differs in keys and masks alone loses the rows that these touch, which are then tracked
-    again. Raises ResultError for a folder that holds something else, a run with neither `resume` nor `overwrite`, or a
-    run of other inputs.
+    again. What was made of another motion than the last goes: report, pictures, smoothed tables. Raises ResultError for
+    a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
     foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
@@ -86,6 +88,8 @@ def prepare_folder(
             f"{folder} holds another run ({differences}); "
             "go on with its options and files, or track into another folder"
         )
+    if is_corrected or not (folder / SUMMARY).is_file():
+        _remove_made(folder)
     tracked = folder / TRACKED_MOTION
     if is_corrected or tracked.is_file():
         (folder / SUMMARY).unlink(missing_ok=True)  # it is not finished until it is tracked, and fitted, again
@@ -165,25 +169,21 @@ def stretches_of(
     ]
 
 
+def _remove_made(folder: Path) -> None:
+    """Remove what is made of a motion: report, pictures and smoothed tables."""
+    for path in (folder / REPORT, folder / SMOOTH_RECORD, *(folder / TABLES).glob("smooth_*")):
+        path.unlink(missing_ok=True)
+    for name in (FIGURES, VIDEOS):
+        shutil.rmtree(folder / name, ignore_errors=True)
+
+
 def _remove_run(folder: Path) -> None:
     """Remove what commands leave in a run's folder; exports and what others put there stay."""
-    for name in (
-        MOTION,
-        JOINTS,
-        JUMPS,
-        SUMMARY,
-        REPORT,
-        CALIBRATION,
-        BODY,
-        COVARIANCE_FILE,
-        LASTING_FILE,
-        SMOOTH_RECORD,
-        *_BEFORE_A_RUN,
-    ):
+    _remove_made(folder)
+    shutil.rmtree(folder / TABLES, ignore_errors=True)
+    made = (MOTION, JOINTS, JUMPS, SUMMARY, CALIBRATION, BODY, COVARIANCE_FILE, LASTING_FILE, *_BEFORE_A_RUN)
+    for name in (*made, RUN_RECORD):
         (folder / name).unlink(missing_ok=True)
-    for name in FOLDERS:
-        shutil.rmtree(folder / name, ignore_errors=True)
-    (folder / RUN_RECORD).unlink()
 
 
 def holds_run_of(trial: Trial, folder: Path) -> bool:

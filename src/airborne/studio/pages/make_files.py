@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.motion.run_folder import FOLDERS
+from airborne.motion.run_folder import VIDEOS
 from airborne.run.export import EXPORT_FORMATS
 from airborne.run.film import check_order
 from airborne.studio.commands import Command
@@ -28,7 +28,7 @@ class Making:
             self._formats = ui.select(list(EXPORT_FORMATS), label="formats (none: all)", value=[], multiple=True)
             self._formats.props("outlined dense options-dense").style("min-width: 220px")
             buttons = [ui.button("Export", on_click=self.export).props("outline")]
-        if any((folder / FOLDERS[2]).glob("overlay_*.mp4")):
+        if any((folder / VIDEOS).glob("overlay_*.mp4")):
             ui.label("A film").classes("soft")
             with ui.element("div").classes("row-line"):
                 buttons.append(self._film())
@@ -49,7 +49,7 @@ class Making:
         first, last = self._first.value, self._last.value
         ends = [(name, f"{n:.0f}") for name, n in (("first", first), ("last", last)) if n is not None]
         stem = "_".join(["film", *(name + n for name, n in ends)])  # each stretch is kept
-        path = f"{self._folder.name}/{FOLDERS[2]}/{stem}.{self._kind.value}"
+        path = f"{self._folder.name}/{VIDEOS}/{stem}.{self._kind.value}"
         words = [word for name, n in ends for word in (f"--{name}", n)]
         self._watch.words = "drawing the film"
         with show_errors():
@@ -68,7 +68,7 @@ class Making:
         return ui.button("Make a film", on_click=self.film).props("outline")
 
     def _list_files(self) -> None:
-        made = sorted([*(self._folder / "export").glob("*"), *(self._folder / FOLDERS[2]).glob("film*")])
+        made = sorted([*(self._folder / "export").glob("*"), *(self._folder / VIDEOS).glob("film*")])
         with ui.element("div").classes("row-line"):
             for path in made:
                 address = f"/file/{quote(self._folder.name)}/{path.parent.name}/{quote(path.name)}"
