@@ -80,21 +80,21 @@ def _without_rounding(covariance: Array) -> Array:
 
 
 def gauge_fixed_inverse(reduced: Array, gauge: Array) -> Array:
-    """Return the inverse of the reduced camera matrix with no motion along the gauge directions.
+    """Return the inverse of the reduced camera matrix (n, n) with no motion along the gauge directions (n, k).
 
-    `(S + k G G^T)^-1 - G G^T / k` with orthonormal G, S G = 0; by Cholesky with the diagonal scaled to 1.
+    `Q (Q^T S Q)^-1 Q^T`, where the columns of Q complete the orthonormal gauge directions to a basis; by Cholesky with
+    the diagonal scaled to 1.
     """
-    size = np.sqrt(np.maximum(np.diag(reduced), 1e-30))
-    k = float(np.mean(np.diag(reduced))) if gauge.shape[1] else 1.0
-    if gauge.shape[1]:
-        k = float(np.mean(np.einsum("i,ik,ik->k", np.diag(reduced), gauge, gauge)))
-    scaled = (reduced + k * gauge @ gauge.T) / size[:, None] / size
+    basis = np.linalg.qr(gauge, mode="complete")[0][:, gauge.shape[1] :] if gauge.shape[1] else np.eye(len(reduced))
+    inner = basis.T @ reduced @ basis
+    size = np.sqrt(np.maximum(np.diag(inner), 1e-30))
+    scaled = inner / size[:, None] / size
     scaled = (scaled + scaled.T) / 2
     try:
         inverse = cho_solve(cho_factor(scaled), np.eye(len(scaled)))
     except np.linalg.LinAlgError:
         inverse = np.linalg.pinv(scaled, hermitian=True)
-    return inverse / size[:, None] / size - gauge @ gauge.T / k
+    return basis @ (inverse / size[:, None] / size) @ basis.T
 
 
 def redundancies(
