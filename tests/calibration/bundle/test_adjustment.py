@@ -55,6 +55,17 @@ def test_one_lens_is_that_of_opencv():
     np.testing.assert_allclose(found.rig.cameras[0].distortion, distortion.ravel(), atol=0.02)
 
 
+def test_where_one_camera_stands_says_nothing_of_its_lens():
+    rng = np.random.default_rng(1)
+    rig = Rig((ring(1).cameras[0],))
+    source = board_of(rng, rig)
+    free, held = (adjust(rig, [source], FreeParameters(n_terms=2, extrinsics=each)) for each in (True, False))
+    assert free.is_gauge_free and not held.is_gauge_free
+    np.testing.assert_allclose(free.camera_sd[0, 6:], held.camera_sd[0, 6:], rtol=0.01)  # six fewer degrees of freedom
+    np.testing.assert_allclose(free.camera_sd[0, :6], 0, atol=1e-9)
+    assert np.isfinite(free.rig.cameras[0].covariance).all()
+
+
 def test_two_cameras_are_those_of_opencv():
     rng = np.random.default_rng(2)
     first = ring(4).cameras[0]
