@@ -24,6 +24,7 @@ from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
+from airborne.motion.flight.momentum_table import flight_warnings
 from airborne.motion.joints import doubtful_segments
 from airborne.motion.run_folder import BODY, MOTION, TRACKED_MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
@@ -246,7 +247,8 @@ class BodyRun:
         measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
-        self.recording.events.extend(checked.doubts)
+        fall = () if measured.flight is None else flight_warnings(motion, measured.flight)
+        self.recording.events.extend([*checked.doubts, *fall])
         is_exact = not self.recording.rig.states_errors
         return motion, {
             "name": self.trial.name,

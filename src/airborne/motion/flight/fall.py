@@ -21,6 +21,8 @@ SPAN_S, FEWEST_OF_SPAN = 0.4, 8  # of a flight from which the centre of mass is 
 # synthetic people, lengths 4 % and girths 12 % off
 _OFFSET_SD_M = 0.01
 _LEAST_NOISE_M = 1e-4  # of a path; an exact one would leave the prior no weight
+# share of gravity: one synthetic person's worlds 10 % too large and too small left 0.06 to 0.10, the right one 0.004
+_LEAST_WRONG, _MOST_WRONG = 0.03, 0.5
 _ROUNDS = 4  # of estimating the noise
 _MOST_CORRELATED = 0.99  # of consecutive residuals: more would leave less than one of 200 independent
 
@@ -60,6 +62,34 @@ def fit_fall(time_s: Array, path: Array, R: Array) -> Fall:
     inverse = np.linalg.inv(terms.T @ terms)
     gravity_sd = max(_noise(residual[:, 2:], n - 3), noise) * np.sqrt(inverse[6, 6])
     return Fall(solution[7:], noise**2 * inverse[7:, 7:], float(solution[6]), float(gravity_sd))
+
+
+def describe_wrong_fall(time_s: Array, path: Array, R: Array, variance: Array) -> str | None:
+    """Say what a flight's gravity tells of wrong lengths or a wrong frame rate; None where it is 9.81 m/s2.
+
+    path (n, 3) [m] of the centre of mass, R (n, 3, 3) world from root, variance (n,) of the heights. Beside the fit's
+    error counts that the centre of mass wanders in the body: a parabola sags by g T^2 / 8.
+    """
+    rows = flight_rows(time_s, path[:, 2], variance)
+    if len(rows):  # parabolas about the frames beside a stance hold some of it
+        first, last = (time_s[row] for row in rows[[0, -1]])
+        begins = first + (_WINDOW_S / 2 if rows[0] > 0 else 0)
+        ends = last - (_WINDOW_S / 2 if rows[-1] < len(time_s) - 1 else 0)
+        rows = rows[(time_s[rows] >= begins) & (time_s[rows] <= ends)]
+    if len(rows) < FEWEST_OF_SPAN:
+        return None
+    fall = fit_fall(time_s[rows], path[rows], R[rows])
+    sd_m_s2 = float(np.hypot(fall.gravity_sd_m_s2, 8 * _OFFSET_SD_M / np.ptp(time_s[rows]) ** 2))
+    off = fall.gravity_m_s2 / GRAVITY_M_S2 - 1
+    if not max(3 * sd_m_s2 / GRAVITY_M_S2, _LEAST_WRONG) < abs(off) < _MOST_WRONG:
+        return None
+    large, high = ("large", "high") if off > 0 else ("small", "low")
+    of_rate = abs(np.sqrt(1 + off) - 1)
+    return (
+        f"in flight the centre of mass falls at {fall.gravity_m_s2:.2f} ± {sd_m_s2:.2f} m/s², not at "
+        f"{GRAVITY_M_S2:.2f}: the calibration's lengths are too {large}, by {100 * abs(off):.0f} % or more, or the "
+        f"stated frame rate is too {high}, by {100 * of_rate:.0f} % or more"
+    )
 
 
 def _noise(residual: Array, freedom: int) -> float:

@@ -12,7 +12,7 @@ from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.fall import UNKNOWN_SD_M, fit_fall, flight_rows
+from airborne.motion.flight.fall import UNKNOWN_SD_M, describe_wrong_fall, fit_fall, flight_rows
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
@@ -132,6 +132,17 @@ def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
         fitted_gravity_sd_m_s2=gravity_sd,
         ballistic_rms_mm=1e3 * rms,
     )
+
+
+def flight_warnings(motion: Motion, table: xr.Dataset) -> list[str]:
+    """Return what a flight, as `measure_flight` gives it, says against the calibration or the frame rate."""
+    rows = np.flatnonzero(motion.has_pose)
+    if len(rows) < 2:
+        return []
+    com, sd = (table[name].to_numpy()[rows] for name in ("com", "com_sd"))
+    variance = np.where(np.isfinite(sd[:, 2]), sd[:, 2], UNKNOWN_SD_M) ** 2
+    said = describe_wrong_fall(motion.time_s[rows], com, motion.R[rows], variance)
+    return [] if said is None else [said]
 
 
 def _as_it_falls(motion: Motion, com: Array, variance: Array) -> tuple[Array, Array]:
