@@ -12,4 +12,6 @@ def test_it_is_said_before_any_number(tmp_path):
     lines = _describe(SUMMARY, tmp_path).splitlines()
     assert lines[0] == "5 frames at 4 Hz: 0 tracked, 3 uncertain, 2 lost"
     assert lines[1] == "no frame was tracked, so none of these numbers can be relied on: see the notes"
+    one = _describe({**SUMMARY, "n_frames": 1, "n_uncertain": 1, "n_lost": 0}, tmp_path).splitlines()
+    assert one[1] == "one frame does not show what else looks like the body, so that it is often uncertain"
     assert not any("relied on" in line for line in _describe({**SUMMARY, "n_tracked": 1}, tmp_path).splitlines())

@@ -232,7 +232,7 @@ def test_the_first_frame_says_what_to_open_also_where_it_failed(trial, tmp_path,
     assert in_process("track", far, "-o", tmp_path / "run", "--first-frame") == 1
     out, _ = capsys.readouterr()
     drawn = [f"figures/overlay_cam{k}.png" for k in (1, 2, 3)]
-    assert f"look at the first frame in {', '.join(drawn)}, correct [start]" in out
+    assert f"look at the first frame in {', '.join(drawn)} and correct [start]" in out
     assert f"results: {tmp_path / 'run'}; open {tmp_path / 'run' / drawn[0]}, " in out
 
 

@@ -151,7 +151,7 @@ def _track(
 def _describe_self_check(summary: dict) -> str | None:
     """Say what the self-check found; alarms are among the notes."""
     findings = summary.get("self_check")
-    if findings is None or summary["n_frames"] == summary["n_lost"]:
+    if findings is None or summary["n_frames"] in (summary["n_lost"], 1):
         return None
     if not findings:
         return "self-check: the scene is never seen without the body, so nothing can be said; track more frames"
@@ -181,18 +181,21 @@ def _describe(summary: dict, output: Path) -> str:
     n, rate_hz = summary["n_frames"], summary["rate_hz"]
     lines = [f"{count(n, 'frame')}{f' at {rate_hz:.5g} Hz' if n > 1 else ''}: {counts}"]
     drawn = [path.relative_to(output).as_posix() for path in _overlays(output)]
-    look = f"look at the first frame in {', '.join(drawn)}, " if drawn else ""
+    look = f"look at the first frame in {', '.join(drawn)}" if drawn else ""
     if "players" in summary:
         from airborne.export.players_report import players_summary
 
         lines += players_summary(summary)
         if n == summary["n_lost"]:
-            lines.append(f"no player was found in any frame: {look}correct [[start.player]]")
+            lines.append(f"no player was found in any frame: {look}{' and ' * bool(look)}correct [[start.player]]")
     elif summary["n_frames"] == summary["n_lost"]:
-        lines.append(f"the body was found in no frame: {look}correct [start]")
+        lines.append(f"the body was found in no frame: {look}{' and ' * bool(look)}correct [start]")
     else:
-        if not summary["n_tracked"]:
-            lines.append(f"no frame was tracked, so none of these numbers can be relied on: {look}see the notes")
+        if n == summary["n_uncertain"] == 1:
+            said = "one frame does not show what else looks like the body, so that it is often uncertain"
+            lines.append(f"{said}: {look}, where every outline must lie on the body" if look else said)
+        elif not summary["n_tracked"]:
+            lines.append("no frame was tracked, so none of these numbers can be relied on: see the notes")
         else:
             position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
             lines.append(

@@ -136,7 +136,7 @@ class BodyRun:
         if body.preset is None:
             return self
         tracker = tracker_of(self.trial.settings, self.model, self.start)
-        estimates = track_frames(tracker, islice(self.recording, N_FRAMES), lambda estimate: None)
+        estimates = track_frames(tracker, islice(replace(self.recording, stop=None), N_FRAMES), lambda estimate: None)
         found = [
             (frames, estimate.pose)
             for frames, estimate in islice(estimates, 0, None, EVERY)

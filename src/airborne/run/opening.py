@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
+import numpy as np
+
 from airborne.calibration.acceptance import require_plausible
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import read_control_points
@@ -27,6 +29,10 @@ from airborne.video import (
     open_recording,
 )
 from airborne.video.containers import ADDRESS
+
+# shares of the calibration's image, chosen: how far a video may reach beyond it (balance, in part cropped before it was
+# calibrated, does by 0.7 %), and how much of it a video shows at least
+_BEYOND, _LEAST_SHARE = 0.02, 0.1
 
 AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)
 
@@ -134,8 +140,23 @@ def _camera_as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Cam
     du, dv = table.saved_offset_px
     if table.saved_scale == 1 and (du, dv) == (0, 0):
         return camera
+    _refuse_outside(camera, table, size)
     saved = camera.resample(scale=(table.saved_scale, table.saved_scale), offset=(du, dv), size=size)
     return replace(saved, shift_sd_px=camera.shift_sd_px / table.saved_scale)
+
+
+def _refuse_outside(camera: Camera, table: CameraTable, size: tuple[int, int]) -> None:
+    """Raise TrialError where a video is said to lie beside the calibration's image, or in a scrap of it."""
+    calibrated, scale = np.array(camera.size), table.saved_scale
+    low, high = (scale * (np.array(corner) - 0.5) + table.saved_offset_px + 0.5 for corner in ((0, 0), size))
+    is_inside = np.all((low > -_BEYOND * calibrated) & (high < (1 + _BEYOND) * calibrated))
+    if not is_inside or np.any(high - low < _LEAST_SHARE * calibrated):
+        (x0, y0), (x1, y1), (width, height) = low, high, calibrated
+        raise TrialError(
+            f"camera '{table.name}': saved_scale = {scale:g} takes its {size[0]}×{size[1]} px to columns {x0:.0f} to "
+            f"{x1:.0f} and rows {y0:.0f} to {y1:.0f} of the calibration's {width}×{height} px; correct saved_scale or "
+            "saved_offset_px"
+        )
 
 
 def video_source(trial: Trial, camera: CameraTable) -> VideoSource:
