@@ -161,6 +161,19 @@ def test_positions_of_landmarks_in_the_file_or_in_a_table(trial, tmp_path):
     assert "first pose found; landmarks are 0 mm off (RMS)" in again.notes[0]
 
 
+def test_a_point_that_cannot_be_right_is_a_mistake_and_a_wrong_stature_a_doubt(trial):
+    positions = dict(zip(NAMES, TRUE[0].tolist(), strict=True))
+    x, y, z = positions["hip_left"]
+    written = ", ".join(f"{name} = {place}" for name, place in {**positions, "hip_left": [x + 3, y, z]}.items())
+    result = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
+    (mistake,) = result.mistakes
+    assert mistake.startswith("start.joints_m: hip_left lies 2.") and mistake.endswith("or the body's size")
+    small = {name: (0.85 * np.array(place)).tolist() for name, place in positions.items()}
+    written = ", ".join(f"{name} = {place}" for name, place in small.items())
+    result = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
+    assert not result.mistakes and result.notes[0].endswith("; check the points and the body's size")
+
+
 def test_points_clicked_in_the_images(trial, tmp_path):
     px = {camera.name: camera.px_from_world(TRUE[0]) for camera in RIG}
     header = ["point", *(f"{name}_{axis}" for name in px for axis in "uv")]

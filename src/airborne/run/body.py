@@ -80,7 +80,7 @@ class BodyRun:
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
         found_notes = () if found is None else (found.note,)
         keys, missed = keys_of_frames(trial, model, opened.recording)
-        opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *missed])
+        opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *first.mistakes, *missed])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first.points)
 
     @property

@@ -149,6 +149,8 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda: find_first_pose(trial, model, recording.rig, opened.detections),
             lambda first: "; ".join([f"start: frame {trial.start.frame}", *first.notes]),
         )
+        if first is not None and trial.start.detections is None:  # a network's mistakes are not the user's
+            checks.mistakes += [f"{trial.name}: {mistake}" for mistake in first.mistakes]
         unseen = out_of_sight(model.with_pose(first.pose), recording.rig) if first is not None else ""
         if unseen == OUT_OF_SIGHT:
             checks.mistakes.append(f"{trial.name}: {unseen}")

@@ -151,10 +151,10 @@ def _refuse_outside(camera: Camera, table: CameraTable, size: tuple[int, int]) -
     low, high = (scale * (np.array(corner) - 0.5) + table.saved_offset_px + 0.5 for corner in ((0, 0), size))
     is_inside = np.all((low > -_BEYOND * calibrated) & (high < (1 + _BEYOND) * calibrated))
     if not is_inside or np.any(high - low < _LEAST_SHARE * calibrated):
-        (x0, y0), (x1, y1), (width, height) = low, high, calibrated
+        (x0, y0), (x1, y1), (width, height) = np.rint([low, high, calibrated]).astype(int)
         raise TrialError(
-            f"camera '{table.name}': saved_scale = {scale:g} takes its {size[0]}×{size[1]} px to columns {x0:.0f} to "
-            f"{x1:.0f} and rows {y0:.0f} to {y1:.0f} of the calibration's {width}×{height} px; correct saved_scale or "
+            f"camera '{table.name}': saved_scale = {scale:g} takes its {size[0]}×{size[1]} px to columns {x0} to "
+            f"{x1} and rows {y0} to {y1} of the calibration's {width}×{height} px; correct saved_scale or "
             "saved_offset_px"
         )
 
