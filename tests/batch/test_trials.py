@@ -90,7 +90,12 @@ def test_new_writes_a_session_and_a_trial_for_each_set_of_videos(tmp_path):
         write(tmp_path / "videos" / name, "")
     study = write_study(tmp_path / "videos", "{athlete}/{condition}_{number}_{camera}.mp4", tmp_path / "study")
     assert [path.name for path in study.trials] == ["anna_dry_1.toml", "anna_wet_1.toml"]
-    assert study.notes == ("anna_wet_1.toml: no video of right; give it its own [[camera]] tables",)
+    study_folder = tmp_path / "study"
+    assert study.notes == (
+        "anna_wet_1.toml: no video of right; give it its own [[camera]] tables",
+        f"calib.toml is not there yet: session.toml expects it in {study_folder}",
+        f"body.toml is not there yet: session.toml expects it in {study_folder}",
+    )
     for name in ("calib.toml", "body.toml"):
         write(tmp_path / "study" / name, "")
     trial = read_trial(study.trials[0])
@@ -107,7 +112,7 @@ def test_new_takes_the_fields_of_interlaced_cameras_from_their_files(tmp_path):
             for _ in range(3):
                 video.write(np.full((48, 64, 3), 90, np.uint8))
     study = write_study(tmp_path / "videos", "{number}_{camera}.mp4", tmp_path / "study")
-    assert study.notes == ("left: session.toml gives its fields as top-first, as the file's flags say",)
+    assert study.notes[0] == "left: session.toml gives its fields as top-first, as the file's flags say"
     for name in ("calib.toml", "body.toml"):
         write(tmp_path / "study" / name, "")
     assert [camera.fields for camera in read_trial(study.trials[0]).camera] == ["top-first", "progressive"]
@@ -118,6 +123,11 @@ def test_new_leaves_files_that_exist_alone(tmp_path):
     write(tmp_path / "study" / "session.toml", "# mine\n")
     study = write_study(tmp_path / "videos", "{number}_{camera}.mp4", tmp_path / "study")
     assert study.session.read_text() == "# mine\n"
+
+
+def test_a_folder_that_is_not_there_is_said_to_be_none(tmp_path):
+    with pytest.raises(AirborneError, match="vidsx is no folder; check the path"):
+        write_study(tmp_path / "vidsx", "{number}_{camera}.mp4", tmp_path / "study")
 
 
 @pytest.mark.parametrize("pattern", ["{camera}.mp4", "{number}.mp4", "{a}_{a}_{camera}.mp4", "{day}/{camera}.mov"])

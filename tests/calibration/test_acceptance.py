@@ -59,10 +59,12 @@ def test_one_point_that_spoils_a_fit_of_least_squares_is_a_reason(tmp_path):
         ("points.csv", "is what the cameras are calibrated from"),
         ("notes.txt", "give a name that ends with .toml"),
         ("none/calib.toml", "there is no folder"),
+        ("trial.toml", "is there and is no calibration"),
     ],
 )
 def test_no_other_file_is_written_over(tmp_path, monkeypatch, capsys, output, said):
-    for name in ("points.csv", "notes.txt"):
+    names = ("points.csv", "notes.txt", "trial.toml")
+    for name in names:
         (tmp_path / name).write_text("mine")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["airborne", "calibrate", "points.csv", "--size", "640x480", "-o", output])
@@ -70,7 +72,7 @@ def test_no_other_file_is_written_over(tmp_path, monkeypatch, capsys, output, sa
         cli.main()
     assert stopped.value.code == 2
     assert said in " ".join(capsys.readouterr().err.split())
-    assert [(tmp_path / name).read_text() for name in ("points.csv", "notes.txt")] == ["mine"] * 2
+    assert [(tmp_path / name).read_text() for name in names] == ["mine"] * 3
 
 
 @pytest.mark.parametrize(

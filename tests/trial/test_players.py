@@ -122,7 +122,7 @@ def test_the_shared_clip_is_read_as_it_is(shared_data):
         ("[track]", "[track]\nmethod = 'mixture'\nseed = -1", "track.seed"),
         ("[track]", '[track]\nmethod = "mixture"\nswing = "wild"', "track.swing"),
         ("[track]", '[track]\noverlay = "fancy"', "track.overlay"),
-        ("[track]", '[track]\nmethod = "mixture"\ntorso = "torso.csv"', "torso.csv not found beside it"),
+        ("[track]", '[track]\nmethod = "mixture"\ntorso = "torso.csv"', "torso.csv not found in "),
         ('"number 7"', '"Anna"', "two players share a name: Anna, Anna, referee"),
         (
             '"number 7"',

@@ -39,6 +39,8 @@ def write_study(
     first video is flagged as interlaced gets its `fields`. Files that exist are left alone. Raises AirborneError for a
     pattern that is none, or that fits no video.
     """
+    if not videos.is_dir():
+        raise AirborneError(f"{videos} is no folder; check the path")
     words = _WORD.findall(pattern)
     if _CAMERA not in words or len(words) < 2 or len(set(words)) < len(words):
         raise AirborneError(
@@ -70,6 +72,11 @@ def write_study(
         missing = [camera for camera in cameras if camera not in by_camera]
         if missing:
             notes.append(f"{files[-1].name}: no video of {', '.join(missing)}; give it its own [[camera]] tables")
+    notes += [
+        f"{name} is not there yet: {SESSION} expects it in {folder}"
+        for name in (calibration, body)
+        if not (_WORD.search(name) or (folder / name).is_file())
+    ]
     return NewStudy(session, tuple(files), tuple(notes))
 
 

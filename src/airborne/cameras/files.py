@@ -81,12 +81,14 @@ def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
                 f"{file.where} says that '{camera.name}' has images of {size_text}; leave --size out"
             )
     if options.unit is None and check_baselines(rig):
-        question = (
-            "millimetres? Then say --unit mm" if longest_baseline_m(rig) > FARTHEST_M else "metres? Then say --unit m"
+        farthest_m = longest_baseline_m(rig)
+        is_far = farthest_m > FARTHEST_M
+        question, distance = (
+            ("millimetres? Then say --unit mm", ".0f") if is_far else ("metres? Then say --unit m", ".3g")
         )
         raise CalibrationError(
-            f"{file.where}: the cameras lie up to {longest_baseline_m(rig):.3g} m from each other; are its lengths in "
-            f"{question}; `airborne convert` writes such a file anew, in metres"
+            f"{file.where}: the cameras lie up to {farthest_m:{distance}} m from each other; are its lengths in "
+            f"{question} to `airborne convert`, which writes the file anew, in metres"
         )
     return rig
 

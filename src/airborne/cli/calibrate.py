@@ -66,6 +66,8 @@ def calibrate_command(
         raise AirborneError(f"-o {output}: give a name that ends with .toml; `airborne convert` writes other formats")
     if not output.parent.is_dir():
         raise AirborneError(f"-o {missing_folder(output)}")
+    if output.exists() and not _is_calibration(output):
+        raise AirborneError(f"-o {output} is there and is no calibration; give the result another name")
     for option, is_given in (("--fisheye", fisheye), ("--timestamps", timestamps is not None)):
         if is_given and board is None:
             raise AirborneError(f"{option} goes with --board; a file of sources says both for each camera or board")
@@ -189,6 +191,16 @@ def _table_sources(files: list[Path], court: str | None, wand_m: float | None, s
         )
     cameras = [{"name": name, "size": list(own)} for name, own in _sizes(size, names).items()]
     return sources_from({"camera": cameras, **table}, Path(), str(path))
+
+
+def _is_calibration(path: Path) -> bool:
+    from airborne.cameras import read_rig
+
+    try:
+        read_rig(path, unit="m")
+    except AirborneError:
+        return False
+    return True
 
 
 def _metres(text: str) -> float:

@@ -39,7 +39,7 @@ def read_truth(path: Path) -> Truth:
     index_name = next((name for name in ("frame", "field") if name in table.names), None)
     if missing or index_name is None:
         absent = ", ".join(missing) if missing else "frame (or field)"
-        hint = "; it holds paths of joints: give it with --joints" if "joint" in table.names else ""
+        hint = "; it holds paths of joints: give it as joints (--joints)" if "joint" in table.names else ""
         raise ResultError(f"{path} has no column {absent}; expected {_EXPECTED}{hint}")
     values = table.numbers(["time_s", *_POSITION, *_ROTATION])
     time_s, position, R = values[:, 0], values[:, 1:4], values[:, 4:].reshape(-1, 3, 3)

@@ -42,6 +42,7 @@ from airborne.motion.run_folder import (
 from airborne.trial.file import Trial
 
 _START_AND_LIGHTS = "start and lights"  # stands among the input files for the tables that a trial file itself holds
+_TABLES_OF_A_TRIAL = "[start], [lights], [calibration], [body] or [[camera]]"
 START = "start"  # stands for the digest of the first key, which other digests hold
 _BEFORE_A_RUN = {CANDIDATES, CANDIDATES_PICTURE}  # what a start that is undecided leaves
 
@@ -122,7 +123,8 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
     differing = [key for key in {**before, **now} if before.get(key) != now.get(key)]
     if name == "settings":
         return "; ".join(f"{key} = {before.get(key)}, now {now.get(key)}" for key in differing)
-    return f"other {', '.join(differing)}" if name == "inputs" else f"other {name}"
+    said = [_TABLES_OF_A_TRIAL if key == _START_AND_LIGHTS else key for key in differing]
+    return f"other {', '.join(said)}" if name == "inputs" else f"other {name}"
 
 
 def stretches_between(recorded: dict[str, Any], identity: dict[str, Any]) -> list[tuple[float, float]]:

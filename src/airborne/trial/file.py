@@ -276,7 +276,7 @@ def list_wrong_names(trial: Trial) -> list[str]:
     folders = {forms.detections for forms in (trial.start, *trial.key)}
     same = [f"two cameras share a name: {', '.join(names)}; give each its own"]
     return same * (len(set(names)) < len(names)) + [
-        f"{name} not found beside it"
+        f"{name} not found in {trial.path('')}"
         for name in (*trial.input_files, *chain.from_iterable(key.source_files for key in trial.key))
         if not (trial.path(name).is_file() or (name in folders and trial.path(name).is_dir()))
     ]
