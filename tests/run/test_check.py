@@ -137,7 +137,8 @@ def test_nothing_is_left_of_a_file_whose_tables_contradict_each_other(folder):
 def test_a_start_in_millimetres_is_a_mistake(folder):
     path = edit(folder, ("position_m = [-0.42419, -0.01495, 1.26533]", "position_m = [-424.19, -14.95, 1265.33]"))
     (mistake,) = check_trial(path).mistakes
-    assert mistake == "trial.toml: start: position_m lies over 100 m away; give metres"
+    assert mistake.startswith("trial.toml: start: position_m = [")
+    assert mistake.endswith("] lies over 100 m away; give metres")
 
 
 def test_masks_that_leave_no_camera_at_the_start_are_a_mistake(folder):

@@ -145,7 +145,10 @@ def _track(
     except KeyboardInterrupt:
         if not any((output / table).is_file() for table in _FIRST_WRITTEN):
             stop("no frame was tracked yet, and nothing is written")
-        stop(f"the frames found so far are in {output}{'' if live else '; --resume goes on'}")
+        motion = output / _FIRST_WRITTEN[0]
+        n = motion.read_text(encoding="utf-8").count("\n") - 1 if motion.is_file() else None  # below its header
+        found = "what was found so far is" if n is None else f"{count(n, 'frame')} found so far, kept"
+        stop(f"{found} in {output}{'' if live else '; --resume goes on'}")
 
 
 def _describe_self_check(summary: dict) -> str | None:

@@ -75,7 +75,7 @@ class Run:
     def players(self) -> PlayersMotion:
         """The players' motion, with the covariance of each joint: arrays in metres."""
         if not self.has_players:
-            raise ResultError(f"{self.folder} holds a run of one body, not of players; use .motion")
+            raise ResultError(f"{self.folder} holds a run of one body, not of players; use .motion and .flight")
         return read_players_run(self.folder)
 
     @property

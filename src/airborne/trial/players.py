@@ -53,7 +53,8 @@ def start_of(name: str, joints_m: Mapping[str, Sequence[float]]) -> PlayerStart:
     start = PlayerStart(name=name, joints_m={joint: np.array(point, float) for joint, point in joints_m.items()})
     far = [joint for joint, point in start.joints_m.items() if np.abs(point).max() > FARTHEST_M]
     if far:
-        raise ValueError(f"{far[0]} lies over {FARTHEST_M:g} m away; give metres")
+        at = start.joints_m[far[0]].tolist()
+        raise ValueError(f"{far[0]} = {at} lies over {FARTHEST_M:g} m away; give metres")
     if start.has_legs:
         _check_legs(start)
     return start

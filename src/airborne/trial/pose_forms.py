@@ -59,7 +59,7 @@ class PoseForms(SettingsTable):
         named = self.joints_m if isinstance(self.joints_m, dict) else {}
         for name, place in {"position_m": self.position_m, **named}.items():
             if place is not None and max(map(abs, place)) > FARTHEST_M:
-                raise ValueError(f"{name} lies over {FARTHEST_M:g} m away; give metres")
+                raise ValueError(f"{name} = {list(place)} lies over {FARTHEST_M:g} m away; give metres")
         return self
 
     @property
