@@ -6,9 +6,11 @@ import json
 import numpy as np
 import pytest
 
+from airborne.cameras import read_rig
 from airborne.errors import ResultError
-from airborne.motion.run_folder import videos_of
+from airborne.motion.run_folder import read_body_run, videos_of
 from airborne.motion.smoothing.smoother import Smoothing
+from airborne.run.key_misses import far_keys
 from airborne.run.smooth import smooth_run
 from airborne.run.track import track_trial
 from airborne.tracking.model_based.refined import RefinedTracker
@@ -137,6 +139,15 @@ def test_a_record_without_keys_is_that_of_a_run_without_keys(cross, tmp_path, mo
     found = searched(monkeypatch)
     track_trial(trial, tmp_path / "run", resume=True, pictures=False)
     assert found == set()
+
+
+def test_a_key_that_the_pictures_contradict_is_named(cross, thrown_cross, run):
+    motion, model = read_body_run(run)
+    rig = read_rig(thrown_cross / "calib_true.toml")
+    near, far = key(thrown_cross, 4), key(thrown_cross, 8, position_m=[0.5, 0.5, 1.5])
+    assert far_keys(cross(near), model, motion, rig) == []
+    (said,) = far_keys(cross(near, far), model, motion, rig)
+    assert said.startswith("[[key]] of frame 8: the body is ") and "as the pictures say otherwise" in said
 
 
 def test_another_start_is_another_run(cross, run, thrown_cross):

@@ -33,6 +33,7 @@ from airborne.run.body_tables import write_tables
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose, out_of_sight
+from airborne.run.key_misses import far_keys
 from airborne.run.keys import keys_of_frames
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
@@ -228,14 +229,8 @@ class BodyRun:
         """Check the run, fit it and write the tables; return the motion and the beginning of the summary."""
         sort_rows(folder / self.table)
         motion, model, begun_s = read_motion(folder / self.table), self.model, time.monotonic()
-        checked = check_run(
-            motion,
-            model,
-            self.recording.rig,
-            self.start,
-            self.kept,
-            is_preset=self.trial.body.file is None,
-        )
+        is_preset = self.trial.body.file is None
+        checked = check_run(motion, model, self.recording.rig, self.start, self.kept, is_preset=is_preset)
         fitted, timings_s = None, {"self_check": time.monotonic() - begun_s}
         if self._fits_whole_run:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))
@@ -247,8 +242,8 @@ class BodyRun:
         measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
-        fall = () if measured.flight is None else flight_warnings(motion, measured.flight)
-        self.recording.events.extend([*checked.doubts, *fall])
+        doubts = *flight_warnings(motion, measured.flight), *far_keys(self.trial, model, motion, self.recording.rig)
+        self.recording.events.extend([*checked.doubts, *doubts])
         is_exact = not self.recording.rig.states_errors
         return motion, {
             "name": self.trial.name,

@@ -5,30 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import Pose
-from airborne.body.chain import delta_between
-from airborne.cameras import Rig
 from airborne.cameras.finding import join_names
 from airborne.errors import count
 from airborne.export.methods_text import name_stretch
 from airborne.motion.run_folder import MOTION, RUN_RECORD, read_record
 from airborne.run.folder import pending_corrections, stretches_between
-from airborne.run.keys import read_key
+from airborne.run.key_misses import miss_by_hand
 from airborne.studio.folder import file_stamp
 from airborne.studio.runs import run_body, run_rig, run_rows
 from airborne.tracking import Status
-from airborne.tracking.evidence import PoseEvidence
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 from airborne.trial.masks import MaskTable
-from airborne.trial.pose_forms import BY_HAND
 
-_FAR_SDS = 3.0  # of a normal deviation, one in 370 is farther
 _MOST_KEYS = 2  # that are told, the worst first
 _LOST = "the pictures show no body near its key; undo it, or drag the body onto what they show, and track again"
 
@@ -106,65 +100,12 @@ def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[st
             told.append((np.inf, f"frame {key.frame} is now lost: {_LOST}"))
             continue
         doubt = "" if status == Status.TRACKED.value else f", which is {status},"
-        own = key.model_copy(update={"detections": None})  # what was set by hand
-        is_by_hand = key.model_fields_set & (BY_HAND | {"joints_m", "points_px"})
-        far = _farthest(read_key(trial, own, model, rig=rig, facts=()), pose, rig) if is_by_hand else None
+        far = miss_by_hand(trial, key, model, pose, rig)
         words = f"at frame {key.frame}{doubt}" + ("" if far is None else f" {far.words}{far.advice}")
         told.append((0.0 if far is None else far.sds, words))
     told = [words for _, words in sorted(told, key=lambda each: -each[0])]
     more = len(told) - _MOST_KEYS
     return told if more <= 0 else [*told[:_MOST_KEYS], f"nearer at {count(more, 'more key')}"]
-
-
-class _Miss(NamedTuple):
-    """How far a pose is from a part of a key."""
-
-    sds: float
-    words: str
-
-    @property
-    def advice(self) -> str:
-        """What to do where it is too far for chance."""
-        return (
-            ", as the pictures say otherwise: correct it in another camera too, or remove it"
-            if self.sds > _FAR_SDS
-            else ""
-        )
-
-
-def _farthest(key: PoseEvidence, pose: Pose, rig: Rig) -> _Miss:
-    """Return the part of a key from which a pose is farthest, in deviations."""
-    points, found = key.model.with_pose(pose).landmarks, list[_Miss]()
-    names = [_plain(landmark.name) for landmark in key.model.landmarks]
-    for mark, P, px, sd_px in zip(key.clicked, key.P, key.px, key.px_sds, strict=True):
-        camera = rig.cameras[int(np.flatnonzero((rig.P == P).all(axis=(1, 2)))[0])]
-        off_px = float(np.linalg.norm(camera.undistort_px(camera.px_from_world(points[mark])) - px))
-        found.append(_miss(f"the {names[mark]} is", off_px, "px", sd=sd_px, than=f"from its click in {camera.name}"))
-    for mark, position, sd_m in zip(key.landmarks, key.positions, key.position_sds, strict=True):
-        off_m = float(np.linalg.norm(points[mark] - position))
-        found.append(_miss(f"the {names[mark]} is", 1e3 * off_m, "mm", sd=1e3 * sd_m, than="from its place in the key"))
-    if key.pose is not None:
-        delta = delta_between(key.pose, pose)
-        if np.isfinite(key.pose_sds[0]):
-            off_m, sd_m = float(np.linalg.norm(delta[:3])), key.pose_sds[0]
-            found.append(_miss("the body is", 1e3 * off_m, "mm", sd=1e3 * sd_m, than="from its place in the key"))
-        turns = np.degrees(np.linalg.norm(delta[3:].reshape(-1, 3), axis=1))
-        for part, (turn, sd) in enumerate(zip(turns, np.degrees(key.pose_sds[3::3]), strict=True)):
-            if np.isfinite(sd):
-                what = "body" if part == 0 else _plain(key.model.segments[part].name)
-                found.append(_miss(f"the {what} is turned", float(turn), "°", sd=sd, than="from its key"))
-    return max(found, key=lambda each: each.sds)
-
-
-def _miss(what: str, off: float, unit: str, *, sd: float, than: str) -> _Miss:
-    space = "" if unit == "°" else " "
-    return _Miss(off / sd, f"{what} {off:.1f}{space}{unit} {than} ({off / sd:.1f} sd)")
-
-
-def _plain(name: str) -> str:
-    """Return a part's name in words: left knee."""
-    words = name.split("_")
-    return " ".join([words[-1], *words[:-1]] if words[-1] in ("left", "right") else words)
 
 
 def name_frames(frames: NDArray[np.int64], step: int = 1) -> str:

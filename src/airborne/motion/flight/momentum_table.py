@@ -134,10 +134,13 @@ def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
     )
 
 
-def flight_warnings(motion: Motion, table: xr.Dataset) -> list[str]:
-    """Return what a flight, as `measure_flight` gives it, says against the calibration or the frame rate."""
+def flight_warnings(motion: Motion, table: xr.Dataset | None) -> list[str]:
+    """Return what a flight, as `measure_flight` gives it, says against the calibration or the frame rate.
+
+    table: None of a body without masses, of which nothing is known.
+    """
     rows = np.flatnonzero(motion.has_pose)
-    if len(rows) < 2:
+    if table is None or len(rows) < 2:
         return []
     com, sd = (table[name].to_numpy()[rows] for name in ("com", "com_sd"))
     variance = np.where(np.isfinite(sd[:, 2]), sd[:, 2], UNKNOWN_SD_M) ** 2
