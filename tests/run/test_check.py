@@ -179,7 +179,7 @@ def test_a_number_as_text_a_part_of_a_frame_and_a_switch_as_a_number_are_refused
     assert sorted(mistakes) == sorted(f"trial.toml: {key}: expected {text}" for key, text in asked.items())
 
 
-@pytest.mark.parametrize("saved", ["saved_scale = 2.0", "saved_scale = 0.01", "saved_offset_px = [0.0, 60.0]"])
+@pytest.mark.parametrize("saved", ["saved_scale = 2.0", "saved_scale = 0.01", "saved_offset_px = [0.0, 300.0]"])
 def test_a_video_that_is_said_to_lie_beside_its_calibration_is_refused(folder, saved):
     path = edit(folder, ('name = "cam1"', f'name = "cam1"\n{saved}'))
     (mistake,) = check_trial(path).mistakes
