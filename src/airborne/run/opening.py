@@ -30,8 +30,8 @@ from airborne.video import (
 )
 from airborne.video.containers import ADDRESS
 
-# shares of the calibration's image, chosen: how far a video may reach beyond it, as one that shows all of a sensor of which
-# a part was calibrated, and how much of it a video shows at least; one that is said to be twice too large does not pass
+# shares of the calibration's image, chosen: how far a video may reach beyond it, as one of all of a sensor of which
+# a part was calibrated, and how much of it a video shows at least; one said to be twice as large as it is does not pass
 _BEYOND, _LEAST_SHARE = 0.5, 0.1
 
 AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)
