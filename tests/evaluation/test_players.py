@@ -142,7 +142,7 @@ def test_text_holds_no_nan_and_names_what_has_no_partner():
     hips = replace(hips, covariance=STILL.covariance[:2, :, :2], joint_status=STILL.joint_status[:2, :, :2])
     text = compare_players(hips, STILL).describe()
     assert "nan" not in text.lower()
-    assert "times; not recovered" in text
+    assert " time; not recovered" in text
 
 
 def test_other_recordings_are_refused_in_one_line():

@@ -46,10 +46,22 @@ def test_a_height_that_nobody_saw_is_unknown_and_uncertain_frames_are_said(tmp_p
     row = {**jump_row(jump), "hip_height_m": np.nan, "n_uncertain": 4}
     _, first, _ = players_summary(summary_of([row]))
     why = "a peak takes five known frames around it, seen by two cameras or more"
-    assert first.startswith(f"one, jump 1: {UNKNOWN_TEXT} ({why}), hips over standing")
+    assert first.startswith(f"one, jump 1: how high the hips rose is not known ({why})")
     assert first.endswith("; 4 of its frames are uncertain")
     page = write_players_report(tmp_path, summary_of([row]), motion).read_text()
     assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"how high the hips rose is not known: {why}." in page
+
+
+def test_what_speaks_against_a_run_is_said_beside_its_numbers():
+    (jump,) = measure_jumps(jumping.motion_of(jumping.Jumper()))
+    summary = summary_of([{**jump_row(jump), "noise_scale": 9.0}])
+    summary["players"] = {
+        "one": {**COUNTS, "n_tracked": 0, "n_uncertain": 150, "n_below_two_cameras": 90, "n_fewer_cameras": 90}
+    }
+    _, untracked, unseen, _, noisy, _ = players_summary(summary)
+    assert untracked == "  no frame of one was tracked, so none of these numbers can be relied on"
+    assert unseen.startswith("  in most frames fewer than two cameras agree on one: are videos exchanged")
+    assert noisy.startswith("  its flight differs from a fall at 9.81 m/s² 3.0 times as much as stated errors explain")
 
 
 def test_its_viewer_shows_one_frame_in_a_browser(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras import Rig, read_rig
-from airborne.errors import ResultError
+from airborne.errors import ResultError, count
 from airborne.evaluation.compare import match_times, nan_to_none, or_dash, question_units, span
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
 from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
@@ -296,5 +296,5 @@ def _error_lines(player: str, errors: PlayerErrors) -> list[str]:
         mean_s, longest_s = errors.mean_recovery_s, errors.longest_recovery_s
         recovery = f"recovered after {mean_s:.2f} s on the mean, {longest_s:.2f} s at most"
         recovery = "not recovered" if math.isnan(mean_s) else recovery
-        lines.append(f"  off by more than 100 mm {errors.n_losses} times; {recovery}")
+        lines.append(f"  off by more than 100 mm {count(errors.n_losses, 'time')}; {recovery}")
     return lines

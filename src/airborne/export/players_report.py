@@ -26,6 +26,10 @@ HEIGHTS_FIGURE = "heights.png"
 _JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
+_NOISY = (
+    4.0  # of the variances: errors in flight twice those stated; 1 to 1.9 with cameras that agree, 8 at a wrong rate
+)
+
 _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits
     "hips": ("hip_height_m", 100.0, 1),  # the height to quote: docs/jumps.md says why
     "feet": ("foot_height_m", 100.0, 1),
@@ -114,12 +118,28 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
         counts = ", ".join(f"{player[f'n_{status}']} {status}" for status in Status)
         sd_mm = player["median_sd_mm"]
         yield f"{name}: {counts}; median sd of a joint {UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
+        n_posed = player["n_tracked"] + player["n_uncertain"]
+        if n_posed and not player["n_tracked"]:
+            yield f"  no frame of {name} was tracked, so none of these numbers can be relied on"
+        n_alone = min(player["n_below_two_cameras"] - player["n_lost"], player["n_fewer_cameras"])
+        if n_alone > n_posed / 2:
+            yield (
+                f"  in most frames fewer than two cameras agree on {name}: are videos exchanged, clocks off (`airborne "
+                "sync`), or is the calibration another's?"
+            )
     for jump in summary["jumps"]:
         hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
         n = jump["n_uncertain"]
         warning = f"; {n} of its frames {'is' if n == 1 else 'are'} uncertain" if n else ""
-        why = f" ({_PEAK_TAKES})" if hips == UNKNOWN_TEXT else ""
-        yield f"{jump['player']}, jump {jump['jump']}: {hips}{why}, hips over standing (95 % interval){warning}"
+        said = f"{hips}, hips over standing (95 % interval)"
+        if hips == UNKNOWN_TEXT:
+            said = f"how high the hips rose is not known ({_PEAK_TAKES})"
+        yield f"{jump['player']}, jump {jump['jump']}: {said}{warning}"
+        if (jump["noise_scale"] or 0.0) > _NOISY:
+            yield (
+                f"  its flight differs from a fall at 9.81 m/s² {np.sqrt(jump['noise_scale']):.1f} times as much as stated "
+                "errors explain: check the frame rate, the clocks and the calibration"
+            )
         pairs = zip(_HEIGHTS[1:], others, strict=True)
         yield "  by other definitions: " + ", ".join(f"{what} {height}" for what, height in pairs)
     yield from _drop_notes(summary)

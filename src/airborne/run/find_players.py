@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from airborne.errors import TrialError, UndecidedError
+from airborne.errors import TrialError, UndecidedError, count
 from airborne.export import write_json
 from airborne.export.finding import draw_player_candidates
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
@@ -63,10 +63,14 @@ def find_players_start(
     first = finding.candidates[0]
     frame, starts = _track_back(trial, recording, finding)
     note = (
-        f"[[start.player]] were found: {len(starts)} stand out best in frame {finding.frames.index} "
+        f"[[start.player]] were found: {_count_standing(len(starts))} out best in frame {finding.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     return FoundPlayers(_with_start(trial, frame, starts), finding, facts, note)
+
+
+def _count_standing(n: int) -> str:
+    return f"{count(n, 'player')} {'stands' if n == 1 else 'stand'}"
 
 
 def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> UndecidedError:

@@ -10,6 +10,7 @@ import numpy as np
 
 from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
+from airborne.errors import count_of
 from airborne.motion import Motion
 from airborne.tracking import Status
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
@@ -56,7 +57,7 @@ def check_run(
         doubtful = rows[is_doubtful & (motion.status[rows] == Status.TRACKED.value)]
         status[doubtful] = Status.UNCERTAIN.value
         if len(doubtful):
-            sentences.append(f"self-check: {len(doubtful)} of {len(motion)} frames are uncertain: {reason}")
+            sentences.append(f"self-check: {count_of(len(doubtful), len(motion), 'frame')} uncertain: {reason}")
     lasting = None if found is None else found.lasting_at(motion.index)
     return CheckedRun(replace(motion, status=status, lasting=lasting), found, tuple(sentences))
 
