@@ -157,7 +157,7 @@ def _describe_self_check(summary: dict) -> str | None:
     if findings is None or summary["n_frames"] in (summary["n_lost"], 1):
         return None
     if not findings:
-        return "self-check: the scene is never seen without the body, so nothing can be said; track more frames"
+        return "self-check: the scene is never seen without the body, so nothing can be said; film a moment without it"
     if any(each["is_alarm"] for each in findings):
         return "self-check: something is wrong, see the notes"
     if not summary["n_tracked"]:

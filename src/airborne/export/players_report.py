@@ -136,9 +136,10 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
             said = f"how high the hips rose is not known ({_PEAK_TAKES})"
         yield f"{jump['player']}, jump {jump['jump']}: {said}{warning}"
         if (jump["noise_scale"] or 0.0) > _NOISY:
+            off = float(np.sqrt(jump["noise_scale"]))
             yield (
-                f"  its flight differs from a fall at 9.81 m/s² {np.sqrt(jump['noise_scale']):.1f} times as much as stated "
-                "errors explain: check the frame rate, the clocks and the calibration"
+                f"  its flight differs from a fall at 9.81 m/s² {off:.1f} times as much as stated errors explain: "
+                "check the frame rate, the clocks and the calibration"
             )
         pairs = zip(_HEIGHTS[1:], others, strict=True)
         yield "  by other definitions: " + ", ".join(f"{what} {height}" for what, height in pairs)

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from airborne.errors import AirborneError, MistakesError, TrialError, count
 from airborne.run.detections import read_trial_detections
+from airborne.run.find import require_two_cameras
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
@@ -135,7 +136,10 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         )
     if trial.start.find:
         who = "players are" if trial.has_players else "body is"
-        checks.add(f"start: not given; the {who} looked for when the trial is tracked")
+        checks.attempt(
+            lambda: require_two_cameras(trial),
+            lambda _: f"start: not given; the {who} looked for when the trial is tracked",
+        )
     elif trial.has_players:
         tracker = checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
@@ -157,11 +161,12 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         elif first is not None:
             if unseen:
                 checks.add(f"note: {unseen}")
-            with start_foregrounds(recording) as foregrounds:
-                checks.attempt(
-                    lambda: refuse_mix_ups(recording.rig, foregrounds, model, first.pose),
-                    lambda _: "videos: no sign that cameras' videos were exchanged",
-                )
+            if len(recording.rig) > 1:
+                with start_foregrounds(recording) as foregrounds:
+                    checks.attempt(
+                        lambda: refuse_mix_ups(recording.rig, foregrounds, model, first.pose),
+                        lambda _: "videos: no sign that cameras' videos were exchanged",
+                    )
     for event in recording.events:
         checks.add(f"note: {event}")
 

@@ -73,8 +73,7 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     TrialError where nothing can be found.
     """
     model = trial.model()
-    if len(trial.camera) < 2:
-        raise TrialError(f"{trial.name}: [start] is missing; finding the body needs two cameras: give its pose")
+    require_two_cameras(trial)
     recording, facts, sample = look_through(trial, progress)
     scenes = empty_scenes(sample)
     if not scenes:
@@ -108,6 +107,13 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
 def describe_probability(probability: float) -> str:
     """Say how sure a finding is; none is said to be certain."""
     return f"probability {probability:.0%}" if probability < _SURE else f"probability over {_SURE:.0%}"
+
+
+def require_two_cameras(trial: Trial) -> None:
+    """Raise TrialError where a start is to be found in the pictures of one camera, which do not tell how far it is."""
+    if len(trial.camera) < 2:
+        what, give = ("players", "[[start.player]]") if trial.has_players else ("the body", "its pose")
+        raise TrialError(f"{trial.name}: [start] is missing; finding {what} needs two cameras: give {give}")
 
 
 def look_through(trial: Trial, progress: Progress | None) -> tuple[Recording, tuple[VideoFacts, ...], list[Frames]]:

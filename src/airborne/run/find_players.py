@@ -7,11 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from airborne.errors import TrialError, UndecidedError, count
+from airborne.errors import UndecidedError, count
 from airborne.export import write_json
 from airborne.export.finding import draw_player_candidates
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
-from airborne.run.find import describe_probability, frames_up_to, look_through, open_candidates, take_candidate
+from airborne.run.find import (
+    describe_probability,
+    frames_up_to,
+    look_through,
+    open_candidates,
+    require_two_cameras,
+    take_candidate,
+)
 from airborne.tracking import Status
 from airborne.tracking.backward import turn_time
 from airborne.tracking.capsules import Blocker
@@ -48,8 +55,7 @@ def find_players_start(
     Where the pictures do not decide who is there, or which way they face, candidates.json and a picture are written
     into `folder` and UndecidedError is raised; `take` chooses one of them, from 1. Raises TrialError where nobody is.
     """
-    if len(trial.camera) < 2:
-        raise TrialError(f"{trial.name}: [start] is missing; finding players needs two cameras: give [[start.player]]")
+    require_two_cameras(trial)
     recording, facts, sample = look_through(trial, progress)
 
     def whole(index: int) -> Frames:

@@ -1,8 +1,9 @@
 """Eliminating the poses gives what one large least squares of poses and parameters gives."""
 
 import numpy as np
+import pytest
 
-from airborne.tracking.self_check.free_flight import fall
+from airborne.tracking.self_check.free_flight import describe_wrong_rate, fall
 from airborne.tracking.self_check.solution import Evidence, pose_errors, solve
 from tests.support.tolerances import SOLVED
 
@@ -62,18 +63,30 @@ def test_a_row_tells_each_block_the_same():
     assert all(abs(each.posterior(np.eye(2))[0][0] - value) < SOLVED for each in (solution, *solution.without))
 
 
-def test_a_fall_is_measured_whatever_point_of_the_body_is_tracked():
-    t = np.arange(12) / 25
+def thrown(n, rate):
+    """Times at a stated rate of a throw filmed at 25 images a second, a point beside its centre, its rotations."""
+    t = np.arange(n) / 25
     angle = 5 * t
     R = np.stack(
         [np.cos(angle), -np.sin(angle), 0 * t, np.sin(angle), np.cos(angle), 0 * t, 0 * t, 0 * t, 1 + 0 * t], 1
     )
     R = R.reshape(-1, 3, 3) @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0.0]])
     centre = np.outer(t, [1.0, 0.2, 3.0]) - 0.5 * np.outer(t**2, [0, 0, 9.81])
-    found = fall(t, centre + R @ np.array([0.1, 0.2, 0.0]), R)
+    return np.arange(n) / rate, centre + R @ np.array([0.1, 0.2, 0.0]), R
+
+
+def test_a_fall_is_measured_whatever_point_of_the_body_is_tracked():
+    found = fall(*thrown(12, 25))
     assert found is not None
     np.testing.assert_allclose(found[1], -9.81, atol=1e-6)
 
 
+@pytest.mark.parametrize(("rate", "said"), [(25, None), (22, None), (12.5, "2.5 m/s²"), (50, "39.2 m/s²"), (3, None)])
+def test_a_fall_that_no_size_explains_tells_of_a_wrong_rate(rate, said):
+    found = describe_wrong_rate(*thrown(40, rate))
+    assert (found is None) if said is None else (said in found and f"{rate / 25:.2f} of that" in found)
+
+
 def test_a_body_at_rest_does_not_fall():
+    assert describe_wrong_rate(np.arange(40) / 25, np.zeros((40, 3)), np.tile(np.eye(3), (40, 1, 1))) is None
     assert fall(np.arange(12) / 25, np.zeros((12, 3)), np.tile(np.eye(3), (12, 1, 1))) is None

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.tracking.self_check.absolute import has_stayed, lies_elsewhere, spread, too_fast
+from airborne.tracking.self_check.absolute import has_stayed, lies_elsewhere, spread, too_fast, zigzags
 from airborne.tracking.self_check.causes import Diagnosis, name_causes
 from airborne.tracking.self_check.empty_scenes import EmptyScenes
 from airborne.tracking.self_check.free_flight import excess, fall
@@ -41,6 +41,7 @@ _FEWEST_MOMENTS = 3  # with fewer, nothing is said of causes
 STAYED = "what the body covered at its start, and does not cover any more, looks as it did then"
 ELSEWHERE = "what stands out from the empty scene lies beside the body by more than its interval"
 FAST = "the body moves faster than bodies do"
+ZIGZAG = "the body goes forth and back between them, as where `fields` under [[camera]] has the wrong order"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,6 +122,7 @@ def doubts(
     return {
         STAYED: spread(np.array(stayed), at, path.index) if pairs else none,
         ELSEWHERE: none if found is None else spread(found.lies_elsewhere, found.index, path.index),
+        ZIGZAG: np.full(len(path.index), zigzags(path.index, path.positions, path.covariance[:, :3, :3])),
         FAST: too_fast(path.time_s, path.positions, path.turns) if len(path.poses) > 1 else none,
     }
 

@@ -11,6 +11,9 @@ _LEAST_MOMENTS, _LEAST_S = 7, 0.25  # of a flight that is measured
 _MOST_RMS_M = 0.008  # about the parabola: more is no free flight, or not of the centre of mass
 _MOST_TILT = 0.15  # horizontal acceleration, as a share of the vertical one
 _LEAST_M_S2, _MOST_M_S2 = 6.0, 15.0  # a fall that a wrong scale can explain
+# chosen: a fall that a wrong frame rate explains, half and twice the right one, and its least length, as hands
+# lead a thing on a short parabola, too
+_SLOWEST_M_S2, _FASTEST_M_S2, _LONG_S = 2.0, 45.0, 0.5
 _LEAST_SD_M_S2 = 0.03  # air, and a centre of mass that is not quite where it is taken to be
 
 
@@ -20,6 +23,32 @@ def fall(time_s: Array, position: Array, R: Array) -> tuple[Array, float, float]
     time_s (n,), root's position (n, 3) [m], R (n, 3, 3) world from root. The centre of mass is fixed in the root, in an
     unknown place. Returns the weights (3 n,) of the positions in the acceleration, it itself and its sd [m/s2].
     """
+    found = _parabola(time_s, position, R)
+    if found is None:
+        return None
+    weights, acceleration, rms = found
+    if not _LEAST_M_S2 < -acceleration < _MOST_M_S2:
+        return None
+    return weights, acceleration, float(np.hypot(_LEAST_SD_M_S2, 2 * rms * np.linalg.norm(weights)))
+
+
+def describe_wrong_rate(time_s: Array, position: Array, R: Array) -> str | None:
+    """Say that a body falls so slowly or fast that no wrong size explains it; None where it does not, or briefly.
+
+    The arrays are those of `fall`.
+    """
+    found = _parabola(time_s, position, R) if len(time_s) and np.ptp(time_s) >= _LONG_S else None
+    if found is None or not _SLOWEST_M_S2 < -found[1] < _FASTEST_M_S2 or _LEAST_M_S2 < -found[1] < _MOST_M_S2:
+        return None
+    share = float(np.sqrt(-found[1] / GRAVITY_M_S2))
+    return (
+        f"the body falls at {-found[1]:.1f} m/s² instead of {GRAVITY_M_S2:.2f}: the stated frame rate seems to be "
+        f"{share:.2f} of that at which it was filmed"
+    )
+
+
+def _parabola(time_s: Array, position: Array, R: Array) -> tuple[Array, float, float] | None:
+    """Return the weights of the positions in the vertical acceleration, it itself and the RMS residual; as `fall`."""
     n, t = len(time_s), time_s - np.mean(time_s)
     if n < _LEAST_MOMENTS or np.ptp(time_s) < _LEAST_S:
         return None
@@ -31,11 +60,8 @@ def fall(time_s: Array, position: Array, R: Array) -> tuple[Array, float, float]
     residual = position.ravel() - design @ solution
     rms = float(np.sqrt(residual @ residual / max(3 * n - 12, 1)))
     g = solution[6:9]
-    is_fall = _LEAST_M_S2 < -g[2] < _MOST_M_S2 and np.hypot(g[0], g[1]) < _MOST_TILT * -g[2] and rms < _MOST_RMS_M
-    if not is_fall:
-        return None
-    weights = inverse[8]
-    return weights, float(g[2]), float(np.hypot(_LEAST_SD_M_S2, 2 * rms * np.linalg.norm(weights)))
+    is_parabola = -g[2] > 0 and np.hypot(g[0], g[1]) < _MOST_TILT * -g[2] and rms < _MOST_RMS_M
+    return (inverse[8], float(g[2]), rms) if is_parabola else None
 
 
 def excess(acceleration: float) -> float:

@@ -45,6 +45,11 @@ class TrackedPath:
         return np.array([pose.world_from_root.translation for pose in self.poses])
 
     @property
+    def rotations(self) -> Array:
+        """The root's orientations, world from root: (n, 3, 3)."""
+        return np.array([pose.world_from_root.rotation.as_matrix() for pose in self.poses])
+
+    @property
     def turns(self) -> Array:
         """Angles between the root's orientations at neighbouring poses: (n - 1,) [rad]."""
         rotations = [pose.world_from_root.rotation for pose in self.poses]
