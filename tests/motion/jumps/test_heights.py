@@ -186,6 +186,24 @@ def test_players_come_in_their_order_each_with_its_own_jump():
     assert result[0].foot_height_m.value > result[1].foot_height_m.value
 
 
+def test_a_take_off_that_one_camera_alone_saw_is_not_stated():
+    motion = motion_of(CLEAN)
+    begins = np.abs(motion.time_s - CLEAN.takeoff_s) < 0.15
+    status, n_views = motion.joint_status.astype("<U9"), motion.n_views.copy()
+    status[begins], n_views[begins] = "uncertain", 1
+    jump = only(replace(motion, joint_status=status, n_views=n_views))
+    assert jump.status == "no take-off" and np.isnan(jump.takeoff_speed_height_m).all()
+    assert np.isfinite(jump.landing_s).all() and np.isfinite(jump.hip_height_m).all()
+
+
+def test_a_drift_is_as_long_as_the_way_between_the_places_however_noisy():
+    ways = [only(motion_of(CLEAN, sd_m=0.05, rng=np.random.default_rng(seed))) for seed in range(5)]
+    for jump in ways:
+        way = [a.value - b.value for a, b in zip(jump.landing_position_m, jump.takeoff_position_m, strict=True)]
+        assert jump.drift_m.value == pytest.approx(np.hypot(*way), rel=0.01)  # medians of draws
+        assert jump.drift_m.low >= 0
+
+
 def test_a_jump_that_the_end_cuts_off_has_no_landing_and_nothing_that_needs_one():
     n = round(60 * (CLEAN.takeoff_s + 0.4))
     points = CLEAN.points()[:n, None, :6]

@@ -29,6 +29,7 @@ _EARLIER_S, _LATER_S = 0.14, 0.06  # search window of an event, about the time a
 _CONTACT_S = 0.15  # of contact that is used
 _GRID_S = 1 / 480  # at which the posterior of an event is computed
 _MOST_SD_S = 0.03  # events with a larger standard deviation are not reported
+_NEAR_S = 0.06  # from an event, chosen: three frames of 60 images a second on either side
 _SLOWEST_FALL_M_S2 = -5.0  # about half of gravity: a body that falls more slowly is supported
 _ANKLE_RISE_M = {True: (0.09, 0.02), False: (0.06, 0.025)}  # at take-off, at landing: mean, standard deviation
 _FOREFOOT_RISE_M = {True: (0.02, 0.01), False: (0.012, 0.01)}  # the toes are the last to leave
@@ -99,7 +100,7 @@ def sample_flight(
     L = np.linalg.cholesky(covariance[i, j])
     parabola = mean[i, j] + (L @ rng.standard_normal((N_DRAWS, 2, 1)))[..., 0]
     events = [
-        _reject_uncertain(None if grid is None else grid[k] + rng.uniform(-0.5, 0.5, N_DRAWS) * _GRID_S)
+        _reject_unseen(track, None if grid is None else grid[k] + rng.uniform(-0.5, 0.5, N_DRAWS) * _GRID_S)
         for grid, k in zip(grids, (i, j), strict=True)
     ]
     return FlightPosterior(rows, events[0], events[1], origin, parabola, scale)
@@ -247,5 +248,9 @@ def _normalise(log_p: Array) -> Array:
     return p / p.sum()
 
 
-def _reject_uncertain(draws: Array | None) -> Array | None:
-    return draws if draws is not None and float(np.std(draws)) <= _MOST_SD_S else None
+def _reject_unseen(track: LegTrack, draws: Array | None) -> Array | None:
+    """Return draws of an event's time; None where they are far apart, or no frame near is seen by two cameras."""
+    if draws is None or float(np.std(draws)) > _MOST_SD_S:
+        return None
+    is_near = np.abs(track.time_s - draws.mean()) <= _NEAR_S
+    return draws if track.is_measured[is_near].any() else None

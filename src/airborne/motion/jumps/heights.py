@@ -93,7 +93,7 @@ def _measure_jump(
         takeoff_speed_m_s=Measurement.from_draws(speed),
         block_s=Measurement.from_draws(None if over is None else 2 * np.sqrt(2 * over / GRAVITY_M_S2)),
         block_level_m=block_level_m,
-        drift_m=Measurement.from_draws(None if start is None or end is None else _along_mean(end - start)),
+        drift_m=_length(None if start is None or end is None else end - start),
         takeoff_position_m=_xy(start),
         landing_position_m=_xy(end),
         hip_peak_speed_m_s=_peak_speed(track, flight, track.mid_hips[0][:, None], track.mid_hips[1][:, None]),
@@ -107,10 +107,13 @@ def _measure_jump(
     )
 
 
-def _along_mean(draws: Array) -> Array:
-    """Return draws of vectors (n, k) along their mean (n,): their lengths alone would be longer than the mean's."""
+def _length(draws: Array | None) -> Measurement:
+    """Measure the length of a vector by draws of it (n, k) along their mean, as theirs are longer than the mean's."""
+    if draws is None:
+        return Measurement.from_draws(None)
     mean = draws.mean(axis=0)
-    return draws @ (mean / max(float(np.linalg.norm(mean)), 1e-12))
+    found = Measurement.from_draws(draws @ (mean / max(float(np.linalg.norm(mean)), 1e-12)))
+    return found._replace(low=max(found.low, 0.0))
 
 
 _STATUS = {(True, True): "whole", (False, True): "no take-off", (True, False): "no landing", (False, False): "neither"}
