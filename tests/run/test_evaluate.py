@@ -163,6 +163,7 @@ def test_a_second_reference_leaves_the_results_of_the_first(run, tmp_path):
     text = (tmp_path / "agreement_methods.txt").read_text()
     assert [text.count(head) for head in ("Against the joints:", "Against the truth:", "References")] == [1, 1, 1]
     assert "bias -10.00" in text
+    assert "Bland JM, Altman DG (2007)" in text and "Bland JM, Altman DG (1999)" not in text  # nothing was repeated
 
 
 def test_each_number_of_the_table_has_its_interval(run, tmp_path):

@@ -12,7 +12,7 @@ from airborne.body.files import read_body
 from airborne.body.outfits import Border
 from airborne.body_fitting.fit import BodyFit
 from airborne.cameras import Rig
-from airborne.errors import TrialError
+from airborne.errors import MistakesError, TrialError
 from airborne.run.own_body import (
     _CELL_PX,
     _LINE_RGB,
@@ -93,6 +93,15 @@ def test_a_person_is_fitted_to_the_frames_of_two_keys_and_drawn_over_them(tmp_pa
     is_line = (image == _LINE_RGB[::-1]).all(axis=2)
     cells = is_line.reshape(2, _CELL_PX, 3, _CELL_PX).sum(axis=(1, 3))
     assert (cells > 400).all()  # each cell has the outline
+
+
+def test_exchanged_videos_are_refused_as_where_the_trial_is_tracked(shared_data, tmp_path):
+    trial = read_trial(shared_data("somersault_1") / "trial.toml")
+    one, two, *others = trial.camera
+    exchanged = [one.model_copy(update={"video": two.video}), two.model_copy(update={"video": one.video}), *others]
+    with pytest.raises(MistakesError, match="the videos of cam1 and cam2 are exchanged"):
+        fit_person(trial.model_copy(update={"camera": exchanged}), tmp_path / "person.toml")
+    assert not list(tmp_path.iterdir())
 
 
 def test_no_frames_are_refused(by_hand, tmp_path):

@@ -13,15 +13,23 @@ from airborne.evaluation.repeatability import Repeatability
 from airborne.evaluation.variables import individuals_of
 from airborne.motion.jumps.jump import Measurement
 
-_REFERENCES = (
-    "Bland JM, Altman DG (1999) Measuring agreement in method comparison studies. Stat Methods Med Res 8:135-160.",
-    "Bland JM, Altman DG (2007) Agreement between methods of measurement with multiple observations per individual. "
-    "J Biopharm Stat 17:571-582.",
-    "McGraw KO, Wong SP (1996) Forming inferences about some intraclass correlation coefficients. "
-    "Psychol Methods 1:30-46.",
-    "Zou GY (2013) Confidence interval estimation for the Bland-Altman limits of agreement with multiple observations "
-    "per individual. Stat Methods Med Res 22:630-642.",
-)
+_REFERENCES = {  # as the text cites them
+    "Bland and Altman 1999": (
+        "Bland JM, Altman DG (1999) Measuring agreement in method comparison studies. Stat Methods Med Res 8:135-160."
+    ),
+    "Bland and Altman 2007": (
+        "Bland JM, Altman DG (2007) Agreement between methods of measurement with multiple observations per "
+        "individual. J Biopharm Stat 17:571-582."
+    ),
+    "McGraw and Wong 1996": (
+        "McGraw KO, Wong SP (1996) Forming inferences about some intraclass correlation coefficients. "
+        "Psychol Methods 1:30-46."
+    ),
+    "Zou 2013": (
+        "Zou GY (2013) Confidence interval estimation for the Bland-Altman limits of agreement with multiple "
+        "observations per individual. Stat Methods Med Res 22:630-642."
+    ),
+}
 
 _FEW = 10  # moments: of fewer, a standard deviation itself is unsure by a quarter, 1 / sqrt(2 (n - 1))
 _Row = TypeVar("_Row")
@@ -95,7 +103,9 @@ def methods_text(
         "As neighbouring frames err alike, intervals rest on the effective number of frames, n / (1 + 2 sum of the "
         "autocorrelations of the differences)."
     )
-    return "\n\n".join([" ".join(text), *results.values(), "\n".join(["References", *_REFERENCES])]) + "\n"
+    said = " ".join(text)
+    references = [reference for cited, reference in _REFERENCES.items() if cited in said]
+    return "\n\n".join([said, *results.values(), "\n".join(["References", *references])]) + "\n"
 
 
 def _paragraphs(begin: str, results: Mapping[str, Sequence[_Row]], say: Callable[[_Row], str]) -> dict[str, str]:

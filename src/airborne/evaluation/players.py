@@ -124,9 +124,10 @@ def compare_players(
         what, ours, theirs = (
             ("player", motion.players, truth.players) if not players else ("joint", motion.joints, truth.joints)
         )
+        names = "name players under [[start.player]] as the truth does, or " if what == "player" else ""
         raise ResultError(
             f"no {what} in common: the run has {', '.join(ours[:4])}, the truth {', '.join(theirs[:4])}; "
-            "give the truth of this recording"
+            f"{names}give the truth of this recording"
         )
     if not len(frames):
         raise ResultError(

@@ -103,9 +103,10 @@ def assess(
 
 def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool, keep: bool) -> Comparisons:
     if truth is None or not is_alone:
+        leave_out = "" if is_alone else "leave clicked points and joints out and "
         raise ResultError(
-            f"{folder} holds a run of players, which is compared with a truth of players only; "
-            "leave clicked points and joints out and give a truth.csv"
+            f"{folder} holds a run of players, which is compared with a truth of players only; {leave_out}give a "
+            "truth.csv"
         )
     check_record(folder)
     comparisons = {"truth": assess_players(folder, truth)}

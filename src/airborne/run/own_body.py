@@ -32,7 +32,9 @@ from airborne.io.writing import missing_folder
 from airborne.rendering import FLAT, render
 from airborne.run.body_clicks import Clicks
 from airborne.run.detections import landmarks_over_time
+from airborne.run.first_pose import find_first_pose
 from airborne.run.landmarks import read_joint_positions, triangulate_clicks
+from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_trial
 from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.trial.file import Trial
@@ -86,6 +88,7 @@ def fit_person(
     recording = opened.recording
     landmarks = _landmarks_by_frame(trial, opened)
     chosen, around = _choose_frames(trial, landmarks, n_frames)
+    _refuse_mix_ups(trial, opened, model)
     clicks = None if opened.detections is None else Clicks.of(recording, opened.detections, chosen)
     look, notes = (lambda points: "", []) if clicks is None else (clicks.camera_to_check, clicks.notes)
     shares, points = model if trial.body.preset else person_of_shares(model), points_of_lengths(model)
@@ -115,6 +118,16 @@ def fit_person(
     return PersonFit(
         fit, tuple(chosen), picture, tuple(dict.fromkeys([*model.notes, *recording.events, *notes, *warnings]))
     )
+
+
+def _refuse_mix_ups(trial: Trial, opened: Opened[Recording], model: BodyModel) -> None:
+    """Raise MistakesError where videos are mixed up, as where the trial is tracked."""
+    refuse_same_files(trial)
+    if not trial.start.find:
+        rig = opened.recording.rig
+        first = find_first_pose(trial, model, rig, opened.detections)
+        with start_foregrounds(opened.recording) as foregrounds:
+            refuse_mix_ups(rig, foregrounds, model, first.pose)
 
 
 def describe_fit(person: PersonFit) -> str:
