@@ -1,6 +1,6 @@
 """A preset becomes the person of the first frames: nearer to their girths, in their clothes."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -48,13 +48,15 @@ def test_body_too_small_to_show_its_parts_is_not_fitted(frames):
     assert fit_preset(GIVEN, [(small, POSE)], mass_kg=MASS_KG) is None
 
 
+@dataclass
 class Clip:
     """The frames of a recording, the first one at `start`."""
 
-    start = 0
+    start: int = 0
+    stop: int | None = 1  # the body is fitted in frames after it, too
 
     def __iter__(self):
-        return (SCENE.frames(index) for index in range(12))
+        return (SCENE.frames(index) for index in range(12 if self.stop is None else self.stop))
 
 
 def test_person_who_is_uncertain_in_the_first_frame_is_fitted_in_those_after(monkeypatch):
