@@ -121,13 +121,11 @@ def compare_players(
     players = [name for name in motion.players if name in truth.players]
     joints = [name for name in motion.joints if name in truth.joints]
     if not players or not joints:
-        what, ours, theirs = (
-            ("player", motion.players, truth.players) if not players else ("joint", motion.joints, truth.joints)
-        )
-        names = "name players under [[start.player]] as the truth does, or " if what == "player" else ""
+        kind = "joint" if players else "player"
+        ours, theirs = (", ".join(getattr(each, f"{kind}s")[:4]) for each in (motion, truth))
+        names = "" if players else "name players under [[start.player]] as the truth does, or "
         raise ResultError(
-            f"no {what} in common: the run has {', '.join(ours[:4])}, the truth {', '.join(theirs[:4])}; "
-            f"{names}give the truth of this recording"
+            f"no {kind} in common: the run has {ours}, the truth {theirs}; {names}give the truth of this recording"
         )
     if not len(frames):
         raise ResultError(
