@@ -185,14 +185,15 @@ def _describe(summary: dict, output: Path) -> str:
     lines = [f"{count(n, 'frame')}{f' at {rate_hz:.5g} Hz' if n > 1 else ''}: {counts}"]
     drawn = [path.relative_to(output).as_posix() for path in _overlays(output)]
     look = f"look at the first frame in {', '.join(drawn)}" if drawn else ""
+    look_and = f"{look} and " if look else ""
     if "players" in summary:
         from airborne.export.players_report import players_summary
 
         lines += players_summary(summary)
         if n == summary["n_lost"]:
-            lines.append(f"no player was found in any frame: {look}{' and ' * bool(look)}correct [[start.player]]")
+            lines.append(f"no player was found in any frame: {look_and}correct [[start.player]]")
     elif summary["n_frames"] == summary["n_lost"]:
-        lines.append(f"the body was found in no frame: {look}{' and ' * bool(look)}correct [start]")
+        lines.append(f"the body was found in no frame: {look_and}correct [start]")
     else:
         if n == summary["n_uncertain"] == 1:
             said = "one frame does not show what else looks like the body, so that it is often uncertain"

@@ -26,9 +26,9 @@ HEIGHTS_FIGURE = "heights.png"
 _JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
-_NOISY = (
-    4.0  # of the variances: errors in flight twice those stated; 1 to 1.9 with cameras that agree, 8 at a wrong rate
-)
+# of the variances, chosen: errors in flight twice those stated; block_jump has 1, with a clock 0.1 s off 2, at a wrong
+# frame rate 8, with exchanged videos 12
+_NOISY = 4.0
 
 _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits
     "hips": ("hip_height_m", 100.0, 1),  # the height to quote: docs/jumps.md says why

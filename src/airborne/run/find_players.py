@@ -68,15 +68,12 @@ def find_players_start(
         raise _ask_for_help(trial, finding, folder)
     first = finding.candidates[0]
     frame, starts = _track_back(trial, recording, finding)
+    stand = "stands" if len(starts) == 1 else "stand"
     note = (
-        f"[[start.player]] were found: {_count_standing(len(starts))} out best in frame {finding.frames.index} "
+        f"[[start.player]] were found: {count(len(starts), 'player')} {stand} out best in frame {finding.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     return FoundPlayers(_with_start(trial, frame, starts), finding, facts, note)
-
-
-def _count_standing(n: int) -> str:
-    return f"{count(n, 'player')} {'stands' if n == 1 else 'stand'}"
 
 
 def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> UndecidedError:

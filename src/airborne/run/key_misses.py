@@ -16,7 +16,7 @@ from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 from airborne.trial.pose_forms import BY_HAND
 
-_FAR_SDS = 4.0  # one sd an axis: of twenty points in the plane, normal errors put one farther once in 150 times
+_FAR_SDS = 4.0  # chosen, one sd an axis: of twenty points in the plane, normal errors put one farther once in 150 times
 
 
 class KeyMiss(NamedTuple):

@@ -21,7 +21,8 @@ SPAN_S, FEWEST_OF_SPAN = 0.4, 8  # of a flight from which the centre of mass is 
 # synthetic people, lengths 4 % and girths 12 % off
 _OFFSET_SD_M = 0.01
 _LEAST_NOISE_M = 1e-4  # of a path; an exact one would leave the prior no weight
-# share of gravity: one synthetic person's worlds 10 % too large and too small left 0.06 to 0.10, the right one 0.004
+# shares of gravity, chosen: a synthetic person's worlds 10 % too large and too small left 0.06 to 0.10, the right one
+# 0.004; half of it is no fall
 _LEAST_WRONG, _MOST_WRONG = 0.03, 0.5
 _ROUNDS = 4  # of estimating the noise
 _MOST_CORRELATED = 0.99  # of consecutive residuals: more would leave less than one of 200 independent

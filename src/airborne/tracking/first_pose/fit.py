@@ -26,8 +26,10 @@ LANDMARK_WEIGHTS = {  # of points that only lie near the landmark they stand for
     **dict.fromkeys(("hand_left", "hand_right", "foot_left", "foot_right"), 0.3),
 }
 
-_DOUBTFUL_RMS_M = 0.05  # good starts of two recorded people left 22 to 39 mm, one with the stature 11 % too small 59 mm
-_FARTHEST_M = 0.31  # no definition of a point lies farther off: `body_fitting.landmark_places` on the head
+_DOUBTFUL_RMS_M = 0.05  # chosen: good starts of two recorded people left 22 to 39 mm, a stature 11 % too small 59 mm
+_FARTHEST_M = (
+    0.31  # chosen as `body_fitting.landmark_places` has it of the head: no definition of a point is farther off
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

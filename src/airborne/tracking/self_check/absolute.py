@@ -21,10 +21,10 @@ _SEARCH_PX = 4  # a camera held by hand may have moved by this
 _LEAST_VACATED, _MOST_UNCHANGED = 0.15, 1 / 3  # shares: of the body's first mask; of what it has left
 _CLEAR_PX = 3  # from a mask's outline
 _MOST_SPEED_M_S, _MOST_TURN_RAD_S = 40.0, 120.0  # a javelin leaves the hand at 30 m/s, a wrist turns at 60 rad/s
-# of a zigzag between frames, as a share of the motion; it is 4 where fields are exchanged in time: the example's is 3.8
-# then, those of nine other runs of bodies and people are 0.2 at most; and frames that tell
+# chosen: half of the zigzag between frames, as a share of the motion, of fields that are exchanged in time, which is 4;
+# the example's is 3.8, those of nine other runs of bodies and people are 0.2 at most. And frames that tell
 _MOST_ZIGZAG, _LEAST_FRAMES = 2.0, 12
-_CLEAR_SDS = 3.0  # of a step's length, from standing still
+_CLEAR_SDS = 3.0  # chosen: a step so long, beside its sd, is no standing still: one in 370 normal errors is
 _MOST_SDS = 4.0  # by which the silhouettes may show a pose elsewhere
 
 

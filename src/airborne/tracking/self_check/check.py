@@ -224,10 +224,8 @@ def _with_fall(
     solution: NuisanceSolution, errors: PoseErrors, path: TrackedPath, rows: Sequence[int]
 ) -> NuisanceSolution:
     """Add what the fall says of the sizes, where the body falls freely."""
-    poses = [path.poses[row].world_from_root for row in rows]
-    position = np.array([pose.translation for pose in poses])
-    R = np.array([pose.rotation.as_matrix() for pose in poses])
-    found = fall(path.time_s[list(rows)], position + errors.seen[:, :3], R)
+    at = list(rows)
+    found = fall(path.time_s[at], path.positions[at] + errors.seen[:, :3], path.rotations[at])
     if found is None:
         return solution
     by_position, acceleration, sd = found
