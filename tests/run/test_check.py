@@ -206,11 +206,32 @@ def test_lines_are_reported_as_they_are_found(folder):
 
 def test_players_are_checked_against_the_cameras(tmp_path):
     path = write_trial(tmp_path / "trial", 3)
-    assert check_trial(path).well[-1].startswith("start: frame 0, Anna")
-    text = path.read_text(encoding="utf-8").replace("hip_left", "hip_x").replace("hip_right", "hip_left")
-    path.write_text(text.replace("hip_x", "hip_right"), encoding="utf-8")
-    notes = check_trial(path).well[-2:]
-    assert all("the hips point the other way than knees and ankles" in note for note in notes), notes
+    *_, start, videos = check_trial(path).well
+    assert start.startswith("start: frame 0, Anna") and videos.startswith("videos: no sign")
+
+
+def exchange_sides(path, *parts):
+    text = path.read_text(encoding="utf-8")
+    text = re.sub(r"(knee_.* = \[[-\d.]+), 0.0", r"\1, 0.1", text)
+    for part in parts:
+        text = text.replace(f"{part}_left", "@").replace(f"{part}_right", f"{part}_left").replace("@", f"{part}_right")
+    path.write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize("parts", [["hip"], ["hip", "knee", "ankle", "foot"], ["hip", "knee"]])
+def test_a_player_whose_knees_would_bend_backward_is_refused(tmp_path, parts):
+    path = write_trial(tmp_path / "trial", 3)
+    exchange_sides(path, *parts)
+    mistakes = check_trial(path).mistakes
+    assert mistakes and all("were left and right exchanged, at the hips or everywhere?" in each for each in mistakes)
+
+
+@pytest.mark.parametrize(("part", "others"), [("knees", "hips and ankles"), ("ankles", "hips and knees")])
+def test_a_player_whose_legs_cross_is_noted(tmp_path, part, others):
+    path = write_trial(tmp_path / "trial", 3)
+    exchange_sides(path, part[:-1])
+    notes = [line for line in check_trial(path).well if "the other way" in line]
+    assert notes and all(f"the {part} point the other way than {others}" in note for note in notes)
 
 
 def test_the_first_frame_is_drawn_and_then_replaced_by_the_whole_run(folder, tmp_path):

@@ -15,12 +15,14 @@ from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source
+from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
 
 _T = TypeVar("_T")
+_NO_MIX_UP = "videos: no sign that cameras' videos were exchanged"
 
 
 class Checks:
@@ -146,26 +148,28 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda _: f"start: frame {trial.start.frame}, {', '.join(player.name for player in trial.start.player)}",
         )
         if tracker is not None:
-            recording.events.extend(start_notes(player_starts(trial, recording.rig)))
+            starts = player_starts(trial, recording.rig)
+            recording.events.extend(start_notes(starts))
+            if len(recording.rig) > 1:
+                checks.attempt(lambda: refuse_players_mix_ups(starts, recording), lambda _: _NO_MIX_UP)
     else:
         model = trial.model()
-        first = checks.attempt(
+        found = checks.attempt(
             lambda: find_first_pose(trial, model, recording.rig, opened.detections),
-            lambda first: "; ".join([f"start: frame {trial.start.frame}", *first.notes]),
+            lambda found: "; ".join([f"start: frame {trial.start.frame}", *found.notes]),
         )
-        if first is not None and trial.start.detections is None:  # a network's mistakes are not the user's
-            checks.mistakes += [f"{trial.name}: {mistake}" for mistake in first.mistakes]
-        unseen = out_of_sight(model.with_pose(first.pose), recording.rig) if first is not None else ""
+        if found is not None and trial.start.detections is None:  # a network's mistakes are not the user's
+            checks.mistakes += [f"{trial.name}: {mistake}" for mistake in found.mistakes]
+        unseen = out_of_sight(model.with_pose(found.pose), recording.rig) if found is not None else ""
         if unseen == OUT_OF_SIGHT:
             checks.mistakes.append(f"{trial.name}: {unseen}")
-        elif first is not None:
+        elif found is not None:
             if unseen:
                 checks.add(f"note: {unseen}")
             if len(recording.rig) > 1:
                 with start_foregrounds(recording) as foregrounds:
                     checks.attempt(
-                        lambda: refuse_mix_ups(recording.rig, foregrounds, model, first.pose),
-                        lambda _: "videos: no sign that cameras' videos were exchanged",
+                        lambda: refuse_mix_ups(recording.rig, foregrounds, model, found.pose), lambda _: _NO_MIX_UP
                     )
     for event in recording.events:
         checks.add(f"note: {event}")

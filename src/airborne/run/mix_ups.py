@@ -76,27 +76,26 @@ def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: l
     for a, b in combinations(range(len(names)), 2):
         crossed = _agreement(images[a], silhouettes[b]), _agreement(images[b], silhouettes[a])
         if crossed[0] >= clear[a] and crossed[1] >= clear[b]:
-            findings.append(
-                Finding(
-                    kind="swapped",
-                    what=_compare(names[a], own[a], crossed[0], f"in that of {names[b]}, whose video fits in turn"),
-                    advice=f"the videos of {names[a]} and {names[b]} are exchanged; exchange them back",
-                    cameras=(names[a], names[b]),
-                )
-            )
-    exchanged = {name for finding in findings for name in finding.cameras}
+            what = _compare(names[a], own[a], crossed[0], f"in that of {names[b]}, whose video fits in turn")
+            findings.append(exchange_finding(names[a], names[b], what))
+    named = {name for finding in findings for name in finding.cameras}
     for i, name in enumerate(names):
-        mirrored = _agreement(images[i], silhouettes[i][:, ::-1])
-        if name not in exchanged and mirrored >= clear[i]:
-            findings.append(
-                Finding(
-                    kind="mirrored",
-                    what=_compare(name, own[i], mirrored, "once it is mirrored"),
-                    advice="its images are mirrored; switch that off in the camera, and record or convert anew",
-                    cameras=(name,),
-                )
-            )
+        agreement = _agreement(images[i], silhouettes[i][:, ::-1])
+        if name not in named and agreement >= clear[i]:
+            findings.append(mirror_finding(name, _compare(name, own[i], agreement, "once it is mirrored")))
     return findings
+
+
+def exchange_finding(a: str, b: str, what: str) -> Finding:
+    """Return the finding that two cameras' videos are exchanged; `what` shows it."""
+    advice = f"the videos of {a} and {b} are exchanged; exchange them back"
+    return Finding(kind="swapped", what=what, advice=advice, cameras=(a, b))
+
+
+def mirror_finding(name: str, what: str) -> Finding:
+    """Return the finding that a camera's images are mirrored; `what` shows it."""
+    advice = f"the images of {name} are mirrored; switch that off in the camera, and record or convert anew"
+    return Finding(kind="mirrored", what=what, advice=advice, cameras=(name,))
 
 
 def _compare(name: str, own: float, other: float, how: str) -> str:

@@ -68,19 +68,27 @@ def player_starts(trial: Trial, rig: Rig) -> tuple[PlayerStart, ...]:
 
 
 def start_notes(starts: Sequence[PlayerStart]) -> list[str]:
-    """Say of each player whose hips point the other way than knees and ankles that sides may be exchanged there."""
+    """Say of each player of whose hips, knees and ankles one pair points against both others that it may be crossed."""
     notes = []
     for start in starts:
         if not start.has_legs:
             continue
-        hips, knees, ankles = (
-            start.joints_m[f"{part}_left"] - start.joints_m[f"{part}_right"] for part in ("hip", "knee", "ankle")
-        )
-        if max(_cosine(hips, knees), _cosine(hips, ankles)) < -_CLEARLY < _CLEARLY < _cosine(knees, ankles):
-            notes.append(
-                f"player '{start.name}': the hips point the other way than knees and ankles; legs that cross, or left "
-                "and right exchanged there?"
-            )
+        pairs = {
+            f"{part}s": start.joints_m[f"{part}_left"] - start.joints_m[f"{part}_right"]
+            for part in ("hip", "knee", "ankle")
+        }
+        for part, across in pairs.items():
+            (a, along_a), (b, along_b) = (other for other in pairs.items() if other[0] != part)
+            if (
+                max(_cosine(across, along_a), _cosine(across, along_b))
+                < -_CLEARLY
+                < _CLEARLY
+                < _cosine(along_a, along_b)
+            ):
+                notes.append(
+                    f"player '{start.name}': the {part} point the other way than {a} and {b}; legs that cross, or left "
+                    "and right exchanged there?"
+                )
     return notes
 
 

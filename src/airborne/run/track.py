@@ -31,6 +31,7 @@ from airborne.run.folder import is_finished, list_tables, prepare_folder, record
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
+from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import compile_kernels
 from airborne.run.provenance import provenance_of
 from airborne.run.self_check import alarms
@@ -38,7 +39,7 @@ from airborne.run.subject import AnyMotion, Subject
 from airborne.tracking.tracker import Found
 from airborne.trial.file import Trial
 from airborne.types import Progress, StageProgress
-from airborne.video import LiveRecording, Outages
+from airborne.video import LiveRecording, Outages, Recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +111,10 @@ def track_trial(
         if trial.has_players:
             opened = _open_live(trial, stack, progress) if live else open_trial(trial, facts)
             opened.recording.events.extend([] if found is None else [found.note])
-            return _run(PlayersRun.open(trial, opened), options, stack)
+            players = PlayersRun.open(trial, opened)
+            if isinstance(opened.recording, Recording):
+                refuse_players_mix_ups(players.starts, opened.recording)
+            return _run(players, options, stack)
         opened = open_trial(trial, facts)
         with start_foregrounds(opened.recording) as foregrounds:
             body = BodyRun.open(trial, opened, found if isinstance(found, FoundStart) else None)

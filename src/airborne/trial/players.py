@@ -16,6 +16,8 @@ from airborne.trial.table import ClickTable, SettingsTable, Vector
 
 _FEET = ("foot_left", "foot_right")
 _MOST_UNDER_FLOOR_M = 0.3  # by how much a calibration's floor may be off
+# chosen: three sds of the mean of both knees or feet, of joints that are 20 mm off each way
+_MOST_BEHIND_M = 0.05
 
 
 class PlayerTable(SettingsTable):
@@ -78,6 +80,7 @@ def _check_legs(start: PlayerStart) -> None:
     points = np.array([start.joints_m[point] for point in LEG_POINTS])
     if points[:2, 2].min() < points[4:, 2].max():
         raise ValueError("a hip lies lower than an ankle; were they exchanged?")
+    _check_facing(start)
     under_m = -float(points[:, 2].min())
     if under_m > _MOST_UNDER_FLOOR_M:
         raise ValueError(f"a joint lies {under_m:.2f} m under the floor, which must be z = 0")
@@ -85,3 +88,23 @@ def _check_legs(start: PlayerStart) -> None:
         Legs.from_points(np.array(start.joints_m["torso"]), points)
     except BodyError as error:
         raise ValueError(str(error)) from error
+
+
+def _check_facing(start: PlayerStart) -> None:
+    """Raise ValueError where knees bend or feet point backward, seen from the hips."""
+    hips = [start.joints_m[f"hip_{side}"] for side in ("left", "right")]
+    forward = np.cross(hips[0] - hips[1], [0.0, 0.0, 1.0])
+    forward /= max(np.linalg.norm(forward), 1e-9)
+    bends, feet = [], []
+    for side, hip in zip(("left", "right"), hips, strict=True):
+        knee, ankle, foot = (start.joints_m.get(f"{part}_{side}") for part in ("knee", "ankle", "foot"))
+        shin = (ankle - hip) / max(np.linalg.norm(ankle - hip), 1e-9)
+        bends.append((knee - hip - (knee - hip) @ shin * shin) @ forward)
+        if foot is not None:
+            feet.append((foot - ankle) @ forward)
+    for what, distances in (("the knees bend", bends), ("the feet point", feet)):
+        behind_m = -float(np.mean(distances or [0.0]))
+        if behind_m > _MOST_BEHIND_M:
+            raise ValueError(
+                f"{what} {100 * behind_m:.0f} cm backward; were left and right exchanged, at the hips or everywhere?"
+            )

@@ -126,12 +126,10 @@ class Blocker:
 
     def _first(self, frames: Frames) -> tuple[Everybody, tuple[PlayerEstimate, ...]]:
         tracks, estimates = {}, []
-        starts = {start.name: start_state(start.name, start.joints_m) for start in self._starts}
-        found = find_bystanders(list(starts.values()), frames)
-        for start in self._starts:
-            others = [each for name, each in starts.items() if name != start.name]
-            occluders = occluding_capsules(starts[start.name], [*others, *(each.fit.state for each in found)])
-            first = fit_first_frame(start.name, start.joints_m, frames, occluders)
+        starts = [start_state(start.name, start.joints_m) for start in self._starts]
+        found = find_bystanders(starts, frames)
+        fits = fit_starts(self._starts, starts, frames, [each.fit.state for each in found])
+        for start, first in zip(self._starts, fits, strict=True):
             tracks[start.name] = _first_track(first, frames)
             n_views = count_unoccluded(
                 first.colours.occlusion, [v for v, view in enumerate(frames.views) if view is not None]
@@ -150,6 +148,20 @@ class Blocker:
             estimates[0] = replace(estimates[0], note=note)
         bystanders = tuple(_first_track(each, frames) for each in found)
         return Everybody(tracks, bystanders, frames.time_s), tuple(estimates)
+
+
+def fit_starts(
+    starts: Sequence[PlayerStart], states: Sequence[Array], frames: Frames, others: Sequence[Array] = ()
+) -> list[FirstFrameFit]:
+    """Fit players to the first frame, from states (35,) nearest to their starts; `others` (35,) stand there too.
+
+    Raises TrialError where no image shows a player.
+    """
+    fits = []
+    for i, (start, state) in enumerate(zip(starts, states, strict=True)):
+        occluders = occluding_capsules(state, [*states[:i], *states[i + 1 :], *others])
+        fits.append(fit_first_frame(start.name, start.joints_m, frames, occluders))
+    return fits
 
 
 def look_for_others(state: Everybody, estimates: Mapping[str, PlayerEstimate], frames: Frames) -> Everybody:

@@ -1,0 +1,110 @@
+"""Mix-ups of players' videos: which are exchanged and which are mirrored, at the first images."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airborne.cameras import Rig, write_pose2sim
+from airborne.errors import MistakesError
+from airborne.run.check import check_trial
+from airborne.run.players_mix_ups import players_mix_up_in
+from airborne.run.track import track_trial
+from airborne.trial.file import read_trial
+from tests.support.clips import write_clip
+from tests.support.jumping_scenes import CAMERAS, FPS, Hall, hop
+
+NAMES = tuple(camera.name for camera in CAMERAS)
+HALL = Hall({"anna": hop((0.5, 0.0)), "bea": hop((1.2, 0.0), 0.1)})
+
+
+@pytest.fixture(scope="module")
+def start():
+    return HALL.starts(), HALL.frames(0)
+
+
+def only(frames, n):
+    return replace(frames, views=frames.views[:n])
+
+
+def exchange(frames, i, j):
+    views = list(frames.views)
+    a, b = views[i], views[j]
+    views[i], views[j] = replace(a, image=b.rgb), replace(b, image=a.rgb)
+    return replace(frames, views=tuple(views))
+
+
+def mirror(frames, i):
+    views = list(frames.views)
+    views[i] = replace(views[i], image=np.ascontiguousarray(views[i].rgb[:, ::-1]))
+    return replace(frames, views=tuple(views))
+
+
+def found(starts, frames):
+    finding = players_mix_up_in(starts, frames)
+    return finding and (finding.kind, finding.cameras)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_videos_of_their_own_cameras_show_nothing(start, n):
+    starts, first = start
+    assert found(starts, only(first, n)) is None
+
+
+@pytest.mark.parametrize(("n", "i", "j"), [(3, 0, 1), (3, 0, 2), (3, 1, 2), (2, 0, 1)])
+def test_two_exchanged_videos_are_named(start, n, i, j):
+    starts, first = start
+    frames = exchange(only(first, n), i, j)
+    assert found(starts, frames) == ("swapped", (NAMES[i], NAMES[j]))
+
+
+@pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 1), (3, 2), (2, 0), (2, 1)])
+def test_a_mirrored_video_is_named(start, n, i):
+    starts, first = start
+    assert found(starts, mirror(only(first, n), i)) == ("mirrored", (NAMES[i],))
+
+
+def test_a_camera_without_an_image_is_left_out(start):
+    starts, first = start
+    frames = exchange(first, 0, 1)
+    assert found(starts, replace(frames, views=(*frames.views[:2], None))) == ("swapped", NAMES[:2])
+
+
+def test_where_nobody_stands_nothing_is_said(start):
+    starts, first = start
+    empty = [replace(view, image=np.full_like(view.rgb, 128)) for view in first.views]
+    assert found(starts, replace(first, views=tuple(empty))) is None
+
+
+def write_trial(folder, order):
+    """Write the hall as a trial whose cameras have the videos of an order; return its path."""
+    files = dict(zip(NAMES, order, strict=True))
+    for i, name in enumerate(NAMES):
+        write_clip(folder / f"{name}.mkv", [HALL.frames(index).views[i].rgb for index in range(3)], rate=FPS)
+    write_pose2sim(folder / "calib.toml", Rig(CAMERAS))
+    lines = ['name = "hall"', *(f'[[camera]]\nname = "{name}"\nvideo = "{files[name]}.mkv"' for name in NAMES)]
+    lines += ['[calibration]\nfile = "calib.toml"\n[body]\npreset = "legs"\n[start]\nframe = 0']
+    for player in HALL.starts():
+        lines += [f'[[start.player]]\nname = "{player.name}"\n[start.player.joints_m]']
+        lines += [f"{joint} = {point.round(4).tolist()}" for joint, point in player.joints_m.items()]
+    path = folder / "trial.toml"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return path
+
+
+def test_exchanged_files_are_refused_by_check_and_track(tmp_path):
+    path = write_trial(tmp_path, (NAMES[1], NAMES[0], NAMES[2]))
+    said = f"the videos of {NAMES[0]} and {NAMES[1]} are exchanged; exchange them back"
+    (mistake,) = check_trial(path).mistakes
+    assert mistake.startswith(
+        f"the videos: with the images of {NAMES[0]} and {NAMES[1]} exchanged, the players at the start fit"
+    )
+    assert mistake.endswith(said)
+    with pytest.raises(MistakesError, match=said):
+        track_trial(read_trial(path), tmp_path / "run", pictures=False)
+
+
+def test_files_of_their_own_cameras_are_tracked(tmp_path):
+    path = write_trial(tmp_path, NAMES)
+    assert not check_trial(path).mistakes
+    assert track_trial(read_trial(path), tmp_path / "run", pictures=False).summary["n_frames"] == 3
