@@ -13,14 +13,14 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.motion import Motion, MotionWriter, read_estimates, read_motion
-from airborne.tracking import Status
+from airborne.tracking import Doubt, Status
 from tests.support.motions import estimate, run_with_gap
 from tests.support.places import ROOT
 from tests.support.tolerances import ROUNDTRIP
 
 COLUMNS = (
     "frame,time_s,status,score,x_m,y_m,z_m,qx,qy,qz,qw,x_m_sd,y_m_sd,z_m_sd,rx_deg_sd,ry_deg_sd,rz_deg_sd,n_views,"
-    "uncertain_joints"
+    "doubts,uncertain_joints"
 )
 MARKED = ((0, 2), (), (1,))  # of three joints, in three frames
 
@@ -36,7 +36,7 @@ def assert_same(result, expected):
     assert len(result) == len(expected)
     for a, b in zip(result, expected, strict=True):
         assert (a.index, a.time_s, a.status, a.n_views) == (b.index, b.time_s, b.status, b.n_views)
-        assert a.uncertain_joints == b.uncertain_joints
+        assert (a.uncertain_joints, a.doubts) == (b.uncertain_joints, b.doubts)
         np.testing.assert_array_equal(a.score, b.score)
         assert (a.pose is None, a.covariance is None) == (b.pose is None, b.covariance is None)
         if a.pose is not None:
@@ -66,6 +66,18 @@ def test_uncertain_joints_come_back_and_another_bodys_are_refused(tmp_path):
     assert read_motion(path).uncertain_joints.tolist() == [[True, False, True], [False] * 3, [False, True, False]]
     path.write_text(path.read_text().replace("/hand", "/tail"))
     with pytest.raises(ResultError, match=r"line 2: uncertain_joints names 'tail', expected some of upper arm"):
+        read_motion(path)
+
+
+def test_doubts_come_back_are_counted_and_others_are_refused(tmp_path):
+    doubts = [(Doubt.IMAGES, Doubt.VIEW), (), (Doubt.IMAGES,)]
+    doubted = [replace(each, doubts=of) for each, of in zip(run_with_gap(3), doubts, strict=True)]
+    path = write(tmp_path / "motion.csv", doubted)
+    assert_same(read_estimates(path), doubted)
+    assert read_motion(path).doubts.tolist() == ["images/view", "", "images"]
+    assert list(read_motion(path).count_doubts().items()) == [("images", 2), ("view", 1)]
+    path.write_text(path.read_text().replace("/view", "/fog"))
+    with pytest.raises(ResultError, match=r"line 2: doubts names 'fog', expected some of images, position, view"):
         read_motion(path)
 
 

@@ -61,6 +61,6 @@ def test_dataset_has_time_in_seconds_and_a_unit_on_every_number(rows):
     np.testing.assert_array_equal(labelled["time"], motion.time_s)
     assert labelled["time"].attrs["units"] == "s"
     assert labelled.attrs["history"] == ["tracked"]
-    assert all("units" in labelled[name].attrs for name in labelled.data_vars if name != "status")
+    assert all("units" in labelled[name].attrs for name in labelled.data_vars if name not in ("status", "doubts"))
     np.testing.assert_array_equal(labelled["position"].sel(space="z"), motion.position[:, 2])
     assert labelled["joint_angle"].sel(joint="chest").shape == (rows, 3)

@@ -13,7 +13,7 @@ from airborne.body.limits import JointLimits
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights, render
 from airborne.rendering.srgb import light_from_srgb
-from airborne.tracking import Estimate
+from airborne.tracking import Estimate, Status
 from airborne.tracking.model_based.refined import RefinedTracker
 from airborne.tracking.tracker import Tracker, step
 from airborne.video import Frames, View
@@ -215,4 +215,7 @@ def worst(scene: Scene, estimates: Sequence[Estimate]) -> tuple[float, float]:
 
 
 def statuses(estimates: Sequence[Estimate]) -> list[str]:
+    """Their statuses; those that are uncertain say why, and others have nothing to say."""
+    for each in estimates:
+        assert bool(each.doubts) == (each.status is Status.UNCERTAIN), each
     return [str(estimate.status) for estimate in estimates]

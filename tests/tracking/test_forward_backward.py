@@ -9,7 +9,7 @@ import pytest
 from airborne.body.chain import delta_between
 from airborne.tracking import both_directions
 from airborne.tracking.both_directions import track_forward_backward
-from airborne.tracking.estimate import Estimate, Status, lost_estimate
+from airborne.tracking.estimate import Doubt, Estimate, Status, lost_estimate
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.video import Frames
 from tests.support.people import HUMAN
@@ -96,6 +96,7 @@ class TurnsRound(LosesAnArm):
 def test_where_the_way_back_does_not_end_at_the_known_start_no_frame_is_tracked():
     estimates = found_by(TurnsRound())
     assert [each.status for each in estimates] == [Status.TRACKED, *[Status.UNCERTAIN] * (N - 1)]
+    assert {each.doubts for each in estimates[1:]} == {(Doubt.DIRECTIONS,)}
     assert {each.status for each in found_by(LosesAnArm())[1:]} == {Status.TRACKED}
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airborne.body.chain import delta_between, move_pose
-from airborne.tracking.estimate import Estimate, Status, lost_estimate
+from airborne.tracking.estimate import Doubt, Estimate, Status, lost_estimate
 from airborne.tracking.passes import Passes, differences, join_passes, parts_of
 from tests.support.people import HUMAN, swinging
 
@@ -86,10 +86,11 @@ def test_segments_that_are_far_apart_are_uncertain_by_name():
     assert join([estimate(TRUTH)], [estimate(TRUTH)])[0].uncertain_joints == ()
 
 
-@pytest.mark.parametrize(("moved_m", "status"), [(0.04, Status.TRACKED), (0.06, Status.UNCERTAIN)])
-def test_a_frame_is_uncertain_where_its_trunk_is_in_two_places(moved_m, status):
+@pytest.mark.parametrize(("moved_m", "doubts"), [(0.04, ()), (0.06, (Doubt.DIRECTIONS,))])
+def test_a_frame_is_uncertain_where_its_trunk_is_in_two_places(moved_m, doubts):
     elsewhere = TRUTH.move(np.array([moved_m, 0, 0]), np.zeros(3))
-    assert join([estimate(TRUTH, 0.001)], [estimate(elsewhere, 0.001)], [1.0])[0].status is status
+    (joined,) = join([estimate(TRUTH, 0.001)], [estimate(elsewhere, 0.001)], [1.0])
+    assert (joined.status, joined.doubts) == (Status.UNCERTAIN if doubts else Status.TRACKED, doubts)
 
 
 def test_the_forward_pass_is_right_up_to_one_frame_and_the_backward_pass_from_there():

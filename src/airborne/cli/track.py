@@ -195,6 +195,10 @@ def _describe(summary: dict, output: Path) -> str:
     elif summary["n_frames"] == summary["n_lost"]:
         lines.append(f"the body was found in no frame: {look_and}correct [start]")
     else:
+        from airborne.export import describe_doubts
+
+        if summary["doubts"]:
+            lines.append(f"uncertain: {describe_doubts(summary)}")
         if n == summary["n_uncertain"] == 1:
             said = "one frame does not show what else looks like the body, so that it is often uncertain"
             lines.append(f"{said}: {look}, where every outline must lie on the body" if look else said)

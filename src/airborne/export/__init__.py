@@ -6,6 +6,6 @@ What draws is imported from its own file, and only where something is drawn: a r
 Knows no search and decides nothing.
 """
 
-from airborne.export.summary import body_warnings, headline, write_json
+from airborne.export.summary import body_warnings, describe_doubts, headline, write_json
 
-__all__ = ["body_warnings", "headline", "write_json"]
+__all__ = ["body_warnings", "describe_doubts", "headline", "write_json"]

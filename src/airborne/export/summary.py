@@ -14,14 +14,24 @@ import numpy as np
 from airborne.errors import count, count_of
 from airborne.io.writing import replace_text
 from airborne.motion import JointStatus, Motion, root_angles
-from airborne.tracking import Status
+from airborne.tracking import Doubt, Status
 from airborne.types import Array
+
+_REASONS = {
+    Doubt.IMAGES: "images and pose agree less than in the frames before",
+    Doubt.POSITION: "a position has an sd over 50 mm",
+    Doubt.VIEW: "much of the body is out of the pictures",
+    Doubt.LIMBS: "limbs may be misplaced, and nothing of the recording was learned before",
+    Doubt.DIRECTIONS: "tracked forward and back in time the body was in different places",
+    Doubt.SELF_CHECK: "the self-check doubts it",
+}
 
 
 def headline(motion: Motion) -> dict[str, Any]:
     """Reduce a motion to its headline numbers; unknown ones are NaN or infinite.
 
     - `n_frames`, `n_tracked`, `n_uncertain`, `n_lost`; `start_s`, `duration_s` (first to last frame), `rate_hz`
+    - `doubts`: how many frames are uncertain for each reason
     - `median_score` [grey levels]
     - `median_position_sd_mm`, `median_rotation_sd_deg`: of each frame's root mean square over the three axes;
       infinite where most frames do not show some direction
@@ -42,6 +52,7 @@ def headline(motion: Motion) -> dict[str, Any]:
         "n_tracked": motion.count(Status.TRACKED),
         "n_uncertain": motion.count(Status.UNCERTAIN),
         "n_lost": motion.count(Status.LOST),
+        "doubts": motion.count_doubts(),
         "start_s": float(ends[0]),
         "duration_s": float(ends[1] - ends[0]),
         "rate_hz": round(1 / float(np.median(np.diff(motion.time_s))), 6) if len(motion) > 1 else math.nan,
@@ -67,11 +78,9 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
     elif head["n_lost"]:
         yield f"{count_of(head['n_lost'], n, 'frame')} lost; they hold no numbers."
     if head["n_uncertain"]:
-        yield (
-            f"{count_of(head['n_uncertain'], n, 'frame')} uncertain: outline and images agree less there than in "
-            "others, the body is badly seen, or the self-check doubts it; look at them in the overlay videos before "
-            "use."
-        )
+        why = f": {describe_doubts(head)}" if head["doubts"] else ""
+        uncertain = count_of(head["n_uncertain"], n, "frame")
+        yield f"{uncertain} uncertain{why}; look at them in the overlay videos before use."
     for what in ("position", "rotation"):
         if head[f"n_{what}_unobservable"]:
             yield (
@@ -90,6 +99,11 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
             "Somersault and twist were counted across lost frames, at the rate before them: they may be off by whole "
             "turns."
         )
+
+
+def describe_doubts(head: Mapping[str, Any]) -> str:
+    """Say why frames are uncertain, and how many for each reason; empty where none is."""
+    return ", ".join(f"{_REASONS[Doubt(doubt)]} ({n})" for doubt, n in head["doubts"].items())
 
 
 def joint_warnings(statuses: Mapping[str, Mapping[str, int]]) -> Iterator[str]:

@@ -30,7 +30,7 @@ from airborne.motion.covariance_file import (
 )
 from airborne.motion.motion import Motion, rigid_transform
 from airborne.motion.tables import cell, motion_columns
-from airborne.tracking import Estimate, Status
+from airborne.tracking import Doubt, Estimate, Status
 
 _UPPER = np.triu_indices(6)  # of the covariance of position and rotation
 _COVARIANCE = [f"cov_{i}{j}" for i, j in zip(*_UPPER, strict=True)]
@@ -264,16 +264,17 @@ def _estimate(row: dict[str, str], joints: tuple[str, ...], full: NDArray[np.flo
         pose=pose,
         covariance=None if np.isnan(covariance).all() else covariance,
         n_views=_whole_number(row, "n_views"),
-        uncertain_joints=_places(row["uncertain_joints"], joints),
+        doubts=tuple(map(Doubt, _names(row, "doubts", tuple(Doubt)))),
+        uncertain_joints=tuple(map(joints.index, _names(row, "uncertain_joints", joints))),
     )
 
 
-def _places(text: str, joints: tuple[str, ...]) -> tuple[int, ...]:
-    names = text.split("/") if text else []
-    unknown = next((name for name in names if name not in joints), None)
+def _names(row: dict[str, str], column: str, known: Sequence[str]) -> list[str]:
+    names = row[column].split("/") if row[column] else []
+    unknown = next((name for name in names if name not in known), None)
     if unknown is not None:
-        raise ValueError(f"uncertain_joints names '{unknown[:40]}', expected some of {', '.join(joints) or 'none'}")
-    return tuple(map(joints.index, names))
+        raise ValueError(f"{column} names '{unknown[:40]}', expected some of {', '.join(known) or 'none'}")
+    return names
 
 
 def _whole_number(row: dict[str, str], column: str) -> int:

@@ -29,6 +29,7 @@ def label_root(motion: Motion, history: Sequence[str] = ()) -> xr.Dataset:
         "status": (time, motion.status, {}),
         "score": (time, motion.score, {"units": "grey levels"}),
         "n_views": (time, motion.n_views, {"units": "1"}),
+        "doubts": (time, motion.doubts),
         "position": (vector, motion.position, {"units": "m", "frame": "world"}),
         "position_sd": (vector, motion.position_sd, {"units": "m", "frame": "world"}),
         "quaternion": (("time", "component"), motion.quaternion, {"units": "1", "map": "world_from_root"}),

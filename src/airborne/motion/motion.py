@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -35,6 +36,7 @@ class Motion:
     covariance: Array  # (n, 6 + 3 joints, 6 + 3 joints)
     joints: tuple[str, ...]  # names of the segments after the root; () for a body in one piece
     joint_angles: Array  # (n, joints, 3) x-y-z [rad]
+    doubts: NDArray[np.str_]  # (n,) why frames are uncertain: values of `Doubt`, separated by slashes; "" for others
     uncertain_joints: NDArray[np.bool_]  # (n, joints) that may be elsewhere, whatever the covariance says
     lasting: Array | None = None  # (n, 6, 6) of the root's errors that last all run long, beside `covariance`
 
@@ -67,6 +69,7 @@ class Motion:
             covariance=covariance,
             joints=joints,
             joint_angles=joint_angles,
+            doubts=np.array(["/".join(e.doubts) for e in estimates], np.str_),
             uncertain_joints=uncertain,
         )
 
@@ -134,6 +137,11 @@ class Motion:
     @property
     def _sd(self) -> Array:
         return standard_deviation(np.diagonal(self.total_covariance, axis1=-2, axis2=-1))
+
+    def count_doubts(self) -> dict[str, int]:
+        """Count the frames that each `Doubt` makes uncertain; the commonest first, those of none left out."""
+        counts = Counter(doubt for doubts in self.doubts.tolist() for doubt in doubts.split("/") if doubt)
+        return dict(counts.most_common())
 
     def count(self, status: Status) -> int:
         """Count the frames of one status."""

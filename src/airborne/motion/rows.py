@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from airborne.body import Pose
 from airborne.errors import ResultError
 from airborne.motion.files import joints_in_header, parse_line
-from airborne.tracking import Status
+from airborne.tracking import Estimate, Status
 from airborne.types import Array
 
 _TIME, _STATUS, _POSITION, _SD = 1, 2, (4, 5, 6), (11, 12, 13)  # columns of motion.csv
@@ -61,14 +61,16 @@ class MotionRows:
         row = int(np.searchsorted(self.index, frame))
         return row if row < len(self.index) and self.index[row] == frame else None
 
+    def estimate(self, row: int) -> Estimate:
+        """Read a row, without the covariances of joints. Raises ResultError."""
+        with self.path.open("rb") as file:
+            file.seek(int(self.starts[row]))
+            return parse_line(self.path, file.readline(), self.joints)
+
     def pose(self, frame: int) -> Pose | None:
         """Read the pose of a frame; None where it has none. Raises ResultError."""
         row = self.row(frame)
-        if row is None:
-            return None
-        with self.path.open("rb") as file:
-            file.seek(int(self.starts[row]))
-            return parse_line(self.path, file.readline(), self.joints).pose
+        return None if row is None else self.estimate(row).pose
 
 
 def read_rows(path: Path, known: MotionRows | None = None) -> MotionRows:

@@ -37,7 +37,8 @@ def motion_columns(motion: Motion) -> dict[str, NDArray]:
     columns |= {f"r{axis}_deg_sd": np.rad2deg(motion.rotation_sd[:, k]) for k, axis in enumerate("xyz")}
     joints = np.array(motion.joints)
     uncertain = ["/".join(joints[is_uncertain]) for is_uncertain in motion.uncertain_joints]
-    return columns | {"n_views": motion.n_views, "uncertain_joints": np.array(uncertain, np.str_)}
+    columns |= {"n_views": motion.n_views, "doubts": motion.doubts}
+    return columns | {"uncertain_joints": np.array(uncertain, np.str_)}
 
 
 def write_motion_parquet(path: Path, motion: Motion) -> None:

@@ -12,7 +12,7 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.errors import count_of
 from airborne.motion import Motion
-from airborne.tracking import Status
+from airborne.tracking import Doubt, Status
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
 from airborne.tracking.self_check.free_flight import describe_wrong_rate
 from airborne.tracking.self_check.kept_frames import KeptFrames
@@ -56,16 +56,17 @@ def check_run(
     body_sd = PRESET_SD if is_preset else MEASURED_SD
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
-    status, sentences = motion.status.astype(f"<U{max(map(len, Status))}"), []
+    status, doubted, sentences = motion.status.astype(object), motion.doubts.astype(object), []
     for reason, is_doubtful in doubts(model, path, frames, (start, first), found).items():
         doubtful = rows[is_doubtful & (motion.status[rows] == Status.TRACKED.value)]
-        status[doubtful] = Status.UNCERTAIN.value
+        status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):
             sentences.append(f"self-check: {count_of(len(doubtful), len(motion), 'frame')} uncertain: {reason}")
     if not model.has_joints and (wrong := describe_wrong_rate(path.time_s, path.positions, path.rotations)):
         sentences.append(f"self-check: {wrong}")
     lasting = None if found is None else found.lasting_at(motion.index)
-    return CheckedRun(replace(motion, status=status, lasting=lasting), found, tuple(sentences))
+    checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)
+    return CheckedRun(checked, found, tuple(sentences))
 
 
 def alarms(findings: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -72,8 +72,10 @@ def run_overlay(run: Path, frame: int, cameras: Sequence[str], *, colour: str | 
     row = rows.row(frame)
     if row is None:
         return {"items": [], "label": f"frame {frame}"}
-    status, pose = str(rows.status[row]), rows.pose(frame)
-    label = f"frame {frame}   {rows.time_s[row]:.3f} s   {status}"
+    estimate = rows.estimate(row)
+    status, pose = estimate.status, estimate.pose
+    why = f": {', '.join(estimate.doubts)}" if estimate.doubts else ""
+    label = f"frame {frame}   {rows.time_s[row]:.3f} s   {status}{why}"
     if pose is None:
         return {"items": [], "label": label}
     shown = run_rig(run).select(cameras).cameras

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import Any, Protocol
 
 from airborne.body import BodyModel, Pose
 from airborne.tracking.backward import turn_estimate, turn_time
-from airborne.tracking.estimate import Estimate, Status, has_unknown_limb, worst_status
+from airborne.tracking.estimate import Doubt, Estimate, Status, has_unknown_limb, with_doubt
 from airborne.tracking.passes import Passes, differences, join_passes
 from airborne.tracking.tracker import Tracker
 from airborne.types import Array
@@ -203,12 +203,8 @@ def _track_both_ways(
         report(len(forward) + len(passes))
     found = {**forward, **{estimate.index: estimate for estimate in join_passes(model, passes[::-1])}}
     if only_if_doubtful and (is_lost or _ends_elsewhere(passes)):
-        return {index: _doubt(each) for index, each in found.items()}, None
+        return {index: with_doubt(each, Doubt.DIRECTIONS) for index, each in found.items()}, None
     return found, None
-
-
-def _doubt(estimate: Estimate) -> Estimate:
-    return replace(estimate, status=worst_status([estimate.status, Status.UNCERTAIN]))
 
 
 def _ends_elsewhere(passes: Sequence[Passes]) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
 
@@ -19,6 +19,17 @@ class Status(StrEnum):
     TRACKED = "tracked"
     UNCERTAIN = "uncertain"
     LOST = "lost"  # no estimate: the pose is None
+
+
+class Doubt(StrEnum):
+    """Why an estimate is uncertain."""
+
+    IMAGES = "images"  # they agree less with the pose than in the frames before
+    POSITION = "position"  # its standard deviation is too large
+    VIEW = "view"  # much of the body is out of the pictures
+    LIMBS = "limbs"  # some may be misplaced, and nothing of this recording was learned before
+    DIRECTIONS = "directions"  # forward and back in time the body was found in different places
+    SELF_CHECK = "self-check"
 
 
 def worst_status(statuses: Iterable[Status]) -> Status:
@@ -43,8 +54,17 @@ class Estimate:
     pose: Pose | None
     covariance: Array | None
     n_views: int  # cameras with an image that shows the body
+    doubts: tuple[Doubt, ...] = ()  # why it is uncertain; of a tracked or lost one none
     mask_shares: tuple[float, float] | None = None  # precision and recall of its mask, by what was learned before
     uncertain_joints: tuple[int, ...] = ()  # those, from 0, that may be elsewhere, whatever the covariance says
+
+
+def with_doubt(estimate: Estimate, doubt: Doubt) -> Estimate:
+    """Return an estimate as uncertain, for one reason more; one that is lost stays so."""
+    if estimate.status is Status.LOST:
+        return estimate
+    doubts = (*(each for each in estimate.doubts if each != doubt), doubt)
+    return replace(estimate, status=Status.UNCERTAIN, doubts=doubts)
 
 
 def lost_estimate(index: int, time_s: Fraction) -> Estimate:

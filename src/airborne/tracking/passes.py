@@ -18,7 +18,7 @@ from scipy.special import chdtri
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import delta_between, joint_angles_of, move_pose
-from airborne.tracking.estimate import Estimate, Status
+from airborne.tracking.estimate import Doubt, Estimate, Status, with_doubt
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.unobserved import with_unobserved, without_unobserved
 from airborne.types import Array
@@ -129,9 +129,10 @@ def _join(model: BodyModel, passes: Passes, takes_backward: NDArray[np.bool_]) -
         pose = _with_limbs(model, forward.pose, backward.pose, [k for k in difference.apart if takes_backward[k]])
     for k in difference.apart:
         covariance[np.ix_(parts[k], parts[k])] += np.outer(delta[parts[k]], delta[parts[k]])
-    status = Status.UNCERTAIN if difference.is_far[limb_of_segment(model) < 0].any() else better.status
+    if difference.is_far[limb_of_segment(model) < 0].any():
+        better = with_doubt(better, Doubt.DIRECTIONS)
     far = tuple(np.flatnonzero(difference.is_far[1:]).tolist())
-    return replace(better, pose=pose, covariance=with_unobserved(covariance), status=status, uncertain_joints=far)
+    return replace(better, pose=pose, covariance=with_unobserved(covariance), uncertain_joints=far)
 
 
 def _with_limbs(model: BodyModel, pose: Pose, other: Pose, parts: Sequence[int]) -> Pose:

@@ -36,7 +36,7 @@ from airborne.rendering.shapes import new_shapes
 from airborne.rendering.sums import PIXELS
 from airborne.tracking.covariance import SHIFT_SD_PX, covariance_of
 from airborne.tracking.direct_search.stepping import Objective, VRule, minimise_by_stepping
-from airborne.tracking.estimate import Estimate, Status, lost_estimate
+from airborne.tracking.estimate import Doubt, Estimate, Status, lost_estimate
 from airborne.tracking.image_regions import crop_regions
 from airborne.types import Array
 from airborne.video import Frames
@@ -135,6 +135,7 @@ class DirectTracker:
             index=frames.index,
             time_s=frames.time_s,
             status=status,
+            doubts=(Doubt.IMAGES,) if status is Status.UNCERTAIN else (),
             score=value,
             pose=pose,
             covariance=self._covariance(observed, cameras, pose, value=value, pixels=float(pixels.sum())),

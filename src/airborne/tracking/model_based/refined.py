@@ -16,7 +16,7 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose
 from airborne.rendering import Lights
 from airborne.tracking import predictors
-from airborne.tracking.estimate import Estimate, Status, lost_estimate
+from airborne.tracking.estimate import Doubt, Estimate, Status, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
@@ -30,7 +30,7 @@ from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.recovery import is_same, recover
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.tracking.model_based.status import Reference, status_of
+from airborne.tracking.model_based.status import Reference, doubts_of, is_lost
 from airborne.tracking.model_based.support import mark_unobserved, shrink_unobserved, widen_unseen
 from airborne.types import Array
 from airborne.video import Frames
@@ -213,25 +213,25 @@ class RefinedTracker:
         if found is None:
             return lost_estimate(frames.index, frames.time_s)
         fit, agreement = found.fit, found.agreement
-        covariance = fit.covariance
-        status = status_of(covariance, agreement, reference)
-        if status is Status.LOST:
+        if is_lost(agreement, reference):
             return lost_estimate(frames.index, frames.time_s)
+        covariance = fit.covariance
+        doubts = list(doubts_of(covariance, agreement, reference))
         if agreement.misplaced:
             limbs = joints_of(self._fitter.model, np.array(agreement.misplaced))
             covariance = mark_unobserved(covariance, limbs.columns)
-            status = status if reference.is_learned else Status.UNCERTAIN
         if agreement.n_views_of is not None:
             covariance = widen_unseen(covariance, self._fitter.model, agreement.n_views_of)
         if frames.index in self._keys:
             covariance = self._keys[frames.index].add_to(covariance, fit.pose)
         posed = self.render_model.with_pose(fit.pose)
         if share_in_view(posed, self.render_model.geometry, frames) < _LEAST_IN_VIEW:
-            status = Status.UNCERTAIN
+            doubts.append(Doubt.VIEW)
         return Estimate(
             index=frames.index,
             time_s=frames.time_s,
-            status=status,
+            status=Status.UNCERTAIN if doubts else Status.TRACKED,
+            doubts=tuple(doubts),
             score=fit.rms_light * 255,
             pose=fit.pose,
             covariance=covariance,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airborne.appearance.foreground import posterior_sums as view_agreement
 from airborne.appearance.model import Region
 from airborne.body import PosedBody
-from airborne.tracking.estimate import Status
+from airborne.tracking.estimate import Doubt
 from airborne.tracking.model_based.render_model import RenderModel
 
 _NEAR_PX = 12  # of a full frame: body-like pixels this close to the mask's bounding box count in the recall
@@ -88,12 +88,16 @@ def mask_agreement(
     return MaskAgreement(float(inside / max(pixels, 1)), float(inside / max(near, 1e-9)), float(evidence), n_views)
 
 
-def status_of(covariance: NDArray, agreement: MaskAgreement, reference: Reference) -> Status:
-    """Judge a fit by how far its agreement is below the reference's, and by its covariance, position [m] first."""
-    if agreement.n_views == 0 or agreement.falls_short(reference, _LOST):
-        return Status.LOST
-    position_sd = np.sqrt(np.diag(covariance)[:3])
-    shares = _UNCERTAIN if reference.is_learned else _UNCERTAIN_AT_FIRST
-    if agreement.falls_short(reference, shares) or np.any(position_sd > _UNCERTAIN_SD_M):
-        return Status.UNCERTAIN
-    return Status.TRACKED
+def is_lost(agreement: MaskAgreement, reference: Reference) -> bool:
+    """Tell whether a fit agrees so little with the images, compared with the reference, that the body is lost."""
+    return agreement.n_views == 0 or agreement.falls_short(reference, _LOST)
+
+
+def doubts_of(covariance: NDArray, agreement: MaskAgreement, reference: Reference) -> Iterator[Doubt]:
+    """Yield why a fit is uncertain, by the reference's agreement, and by its covariance, position [m] first."""
+    if agreement.falls_short(reference, _UNCERTAIN if reference.is_learned else _UNCERTAIN_AT_FIRST):
+        yield Doubt.IMAGES
+    if np.any(np.sqrt(np.diag(covariance)[:3]) > _UNCERTAIN_SD_M):
+        yield Doubt.POSITION
+    if agreement.misplaced and not reference.is_learned:
+        yield Doubt.LIMBS
