@@ -52,6 +52,12 @@ def test_a_height_that_nobody_saw_is_unknown_and_uncertain_frames_are_said(tmp_p
     assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"how high the hips rose is not known: {why}." in page
 
 
+def test_a_run_without_a_jump_says_so_and_one_of_a_single_frame_does_not():
+    summary = summary_of([])
+    assert list(players_summary(summary))[1:] == ["no jump was found"]
+    assert len(list(players_summary({**summary, "n_frames": 1}))) == 1
+
+
 def test_what_speaks_against_a_run_is_said_beside_its_numbers():
     (jump,) = measure_jumps(jumping.motion_of(jumping.Jumper()))
     summary = summary_of([{**jump_row(jump), "noise_scale": 9.0}])

@@ -154,6 +154,14 @@ def test_folders_of_other_runs_are_left_alone(path, tmp_path):
         track_trial(read_trial(path, {"stop": 3}), tmp_path / "run", resume=True, pictures=False)
 
 
+def test_exports_of_the_run_before_are_named(path, tmp_path):
+    trial, run = read_trial(path), tmp_path / "run"
+    assert not any("export" in line for line in track_trial(trial, run, pictures=False).summary["warnings"])
+    (run / "export").mkdir()
+    warnings = track_trial(trial, run, overwrite=True, pictures=False).summary["warnings"]
+    assert "export/ is of the run before; `airborne export` writes it anew" in warnings
+
+
 def test_a_start_past_the_end_is_refused(tmp_path):
     trial = write_trial(tmp_path / "trial", 4, start="frame = 30")
     with pytest.raises(TrialError, match="there is no frame 30"):

@@ -217,7 +217,7 @@ def _describe(summary: dict, output: Path) -> str:
 
 
 def _describe_sd(sd: float, unit: str) -> str:
-    return f"{sd:.2g} {unit}" if math.isfinite(sd) else "not visible in the images"
+    return f"{float(f'{sd:.2g}'):g} {unit}" if math.isfinite(sd) else "not visible in the images"
 
 
 def fit_body_command(

@@ -127,6 +127,8 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
                 f"  in most frames fewer than two cameras agree on {name}: are videos exchanged, clocks off (`airborne "
                 "sync`), or is the calibration another's?"
             )
+    if not summary["jumps"] and summary["n_frames"] > 1:
+        yield "no jump was found"
     for jump in summary["jumps"]:
         hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
         n = jump["n_uncertain"]

@@ -23,6 +23,7 @@ SMOOTH_RECORD = "smooth.json"
 CANDIDATES, CANDIDATES_PICTURE = "candidates.json", "candidates.png"  # of a start that is undecided
 PICTURES = "pictures.json"  # beside the videos: some of their pictures
 TABLES, FIGURES, VIDEOS = "tables", "figures", "videos"
+EXPORTS = "export"  # what `export` writes into, where it is told nothing else
 ANGLES, JOINT_ANGLES, FLIGHT = (f"{TABLES}/{name}.csv" for name in ("angles", "joint_angles", "flight"))
 TRACKED_MOTION = f"{TABLES}/tracked_motion.csv"  # before the fit of a whole run, as it was tracked
 SMOOTH_JOINTS = f"{TABLES}/smooth_joints.csv"

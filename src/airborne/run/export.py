@@ -22,7 +22,7 @@ from airborne.export.trc import write_trc
 from airborne.io.parquet import CAN_WRITE_PARQUET
 from airborne.io.writing import explain_full_disk
 from airborne.motion import Motion, has_inertias, landmarks, measure_flight
-from airborne.motion.run_folder import holds_players, note_if_unfinished, read_body_run, read_players_run
+from airborne.motion.run_folder import EXPORTS, holds_players, note_if_unfinished, read_body_run, read_players_run
 from airborne.types import Array, Progress, StageProgress
 
 EXPORT_FORMATS = ("c3d", "trc", "mot", "osim", "gltf", "bvh", "csv", "parquet")
@@ -75,7 +75,7 @@ def export_run(
             raise ResultError(f"{reason}, and {' and '.join(unfit)} hold no times; write trc, mot, gltf or csv")
         notes += [f"{reason}: left out {', '.join(unfit)}, which hold no times"] if unfit else []
         wanted = [format for format in wanted if format not in unfit]
-    target = folder / "export" if output is None else output
+    target = folder / EXPORTS if output is None else output
     target.mkdir(parents=True, exist_ok=True)
     stem = portable_names([folder.resolve().name])[0]
     files: list[Path] = []

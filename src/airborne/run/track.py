@@ -21,7 +21,7 @@ from airborne.export.summary import joint_warnings
 from airborne.io.figures import names_not_drawn
 from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion, read_motion, read_players
-from airborne.motion.run_folder import CALIBRATION, MOTION, REPORT, SUMMARY, read_summary
+from airborne.motion.run_folder import CALIBRATION, EXPORTS, MOTION, REPORT, SUMMARY, read_summary
 from airborne.run.body import BodyRun
 from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
@@ -157,6 +157,8 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
         *joint_warnings(summary.get("joint_statuses", {})),
         *alarms(summary.get("self_check", [])),
     ]
+    if (folder / EXPORTS).is_dir():
+        summary["warnings"].append(f"{EXPORTS}/ is of the run before; `airborne export` writes it anew")
     if options.drawn is not None:
         summary["warnings"] += names_not_drawn([subject.trial.name, *recording.rig.names, *subject.names])
     summary["tables"] = list_tables(folder)

@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.motion.run_folder import VIDEOS
+from airborne.motion.run_folder import EXPORTS, VIDEOS
 from airborne.run.export import EXPORT_FORMATS
 from airborne.run.film import check_order
 from airborne.studio.commands import Command
@@ -68,7 +68,7 @@ class Making:
         return ui.button("Make a film", on_click=self.film).props("outline")
 
     def _list_files(self) -> None:
-        made = sorted([*(self._folder / "export").glob("*"), *(self._folder / VIDEOS).glob("film*")])
+        made = sorted([*(self._folder / EXPORTS).glob("*"), *(self._folder / VIDEOS).glob("film*")])
         with ui.element("div").classes("row-line"):
             for path in made:
                 address = f"/file/{quote(self._folder.name)}/{path.parent.name}/{quote(path.name)}"
