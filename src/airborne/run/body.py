@@ -37,6 +37,7 @@ from airborne.run.key_misses import far_keys
 from airborne.run.keys import keys_of_frames
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
+from airborne.run.untracked import explain_untracked
 from airborne.run.whole_run import FittedRun, fit_whole_run
 from airborne.tracking import Estimate
 from airborne.tracking.estimate import Status
@@ -244,6 +245,9 @@ class BodyRun:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
         doubts = *flight_warnings(motion, measured.flight), *far_keys(self.trial, model, motion, self.recording.rig)
         self.recording.events.extend([*checked.doubts, *doubts])
+        if not motion.count(Status.TRACKED) and len(motion) > 1:
+            args = self.trial.settings, model, self.start, self.recording, progress_of("trying videos exchanged")
+            self.recording.events.extend(filter(None, [explain_untracked(*args)]))
         is_exact = not self.recording.rig.states_errors
         return motion, {
             "name": self.trial.name,

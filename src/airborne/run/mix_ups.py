@@ -6,9 +6,10 @@ camera: exchanged files agree with each other's cameras, a mirrored image with i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
 
@@ -24,7 +25,7 @@ from airborne.io.files import find_copies
 from airborne.rendering import FLAT, render
 from airborne.trial.file import Trial
 from airborne.types import Mask
-from airborne.video import Recording, VideoFacts, VideoSource
+from airborne.video import Frames, Recording, VideoFacts, VideoSource
 from airborne.video.decoding import decode, rgb_from_decoded
 
 _SHORT_SIDE_PX = 180  # of the images compared
@@ -73,29 +74,61 @@ def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: l
     own = [_agreement(image, silhouette) for image, silhouette in zip(images, silhouettes, strict=True)]
     clear = [max(_LEAST_AGREEMENT, each / _MOST_OF_IT) for each in own]
     findings = []
-    for a, b in combinations(range(len(names)), 2):
-        crossed = _agreement(images[a], silhouettes[b]), _agreement(images[b], silhouettes[a])
+    for mix_up in possible_mix_ups(len(names)):
+        a, b = mix_up.cameras[0], mix_up.cameras[-1]
+        if mix_up.is_exchange:
+            crossed = _agreement(images[a], silhouettes[b]), _agreement(images[b], silhouettes[a])
+            how = f"in that of {names[b]}, whose video fits in turn"
+        elif any(names[a] in finding.cameras for finding in findings):
+            continue
+        else:
+            crossed = (_agreement(images[a], silhouettes[a][:, ::-1]),) * 2
+            how = "once it is mirrored"
         if crossed[0] >= clear[a] and crossed[1] >= clear[b]:
-            what = _compare(names[a], own[a], crossed[0], f"in that of {names[b]}, whose video fits in turn")
-            findings.append(exchange_finding(names[a], names[b], what))
-    named = {name for finding in findings for name in finding.cameras}
-    for i, name in enumerate(names):
-        agreement = _agreement(images[i], silhouettes[i][:, ::-1])
-        if name not in named and agreement >= clear[i]:
-            findings.append(mirror_finding(name, _compare(name, own[i], agreement, "once it is mirrored")))
+            findings.append(mix_up.finding(names, _compare(names[a], own[a], crossed[0], how)))
     return findings
 
 
-def exchange_finding(a: str, b: str, what: str) -> Finding:
-    """Return the finding that two cameras' videos are exchanged; `what` shows it."""
-    advice = f"the videos of {a} and {b} are exchanged; exchange them back"
-    return Finding(kind="swapped", what=what, advice=advice, cameras=(a, b))
+@dataclass(frozen=True, slots=True)
+class MixUp:
+    """Two cameras' videos exchanged, or one camera's images mirrored: by their places in the rig."""
+
+    cameras: tuple[int, ...]
+
+    @property
+    def is_exchange(self) -> bool:
+        """Whether two cameras' videos are exchanged."""
+        return len(self.cameras) == 2
+
+    def describe(self, names: Sequence[str]) -> str:
+        """Return how its images would be right, by the rig's names."""
+        of = join_names([names[i] for i in self.cameras])
+        return f"the images of {of} {'exchanged' if self.is_exchange else 'mirrored'}"
+
+    def undo(self, frames: Frames) -> Frames | None:
+        """Return frames with the images as they would be without it; None where one is missing or does not fit."""
+        views, sources = list(frames.views), [frames.views[i] for i in reversed(self.cameras)]
+        for i, source in zip(self.cameras, sources, strict=True):
+            view = frames.views[i]
+            if view is None or source is None or view.camera.size != source.camera.size:
+                return None
+            views[i] = replace(view, image=source.rgb if self.is_exchange else np.ascontiguousarray(view.rgb[:, ::-1]))
+        return replace(frames, views=tuple(views))
+
+    def finding(self, names: Sequence[str], what: str) -> Finding:
+        """Return it as a finding, by the rig's names; `what` shows it."""
+        cameras = tuple(names[i] for i in self.cameras)
+        if self.is_exchange:
+            both = join_names(cameras)
+            advice = f"the videos of {both} are exchanged; exchange them back"
+            return Finding(kind="swapped", what=what, advice=advice, cameras=cameras)
+        advice = f"the images of {cameras[0]} are mirrored; switch that off in the camera, and record or convert anew"
+        return Finding(kind="mirrored", what=what, advice=advice, cameras=cameras)
 
 
-def mirror_finding(name: str, what: str) -> Finding:
-    """Return the finding that a camera's images are mirrored; `what` shows it."""
-    advice = f"the images of {name} are mirrored; switch that off in the camera, and record or convert anew"
-    return Finding(kind="mirrored", what=what, advice=advice, cameras=(name,))
+def possible_mix_ups(n_cameras: int) -> list[MixUp]:
+    """Return what can be mixed up: each two cameras' videos, and each camera's images."""
+    return [MixUp(cameras) for n in (2, 1) for cameras in combinations(range(n_cameras), n)]
 
 
 def _compare(name: str, own: float, other: float, how: str) -> str:

@@ -1,0 +1,57 @@
+"""A run of a body of which no frame is tracked: the mix-up that would explain it is named, and nothing else is."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from airborne.cameras import Rig
+from airborne.run.mix_ups import MixUp, possible_mix_ups
+from airborne.run.untracked import explain_untracked
+from airborne.tracking.methods import Settings
+from tests.support.scenes import CAMERAS, CROSS, Scene
+
+SCENE = Scene(cameras=CAMERAS[:3])
+RIG = Rig(tuple(SCENE.cameras))
+NAMES = RIG.names
+
+
+@dataclass
+class Played:
+    """A recording of the scene's first frames, some of its videos mixed up."""
+
+    mix_up: MixUp | None
+    rig: Rig = RIG
+
+    def __iter__(self):
+        frames = (SCENE.frames(index) for index in range(6))
+        return (frames if self.mix_up is None else (self.mix_up.undo(each) for each in frames)).__iter__()
+
+
+def explained(mix_up, start=None):
+    return explain_untracked(Settings(), CROSS, start or SCENE.start(), Played(mix_up))
+
+
+@pytest.mark.parametrize("mix_up", [MixUp((0, 1)), MixUp((1, 2)), MixUp((2,))])
+def test_a_mix_up_is_named(mix_up):
+    said = explained(mix_up)
+    assert said == mix_up.finding(NAMES, f"with {mix_up.describe(NAMES)}, 5 of the first 5 frames are tracked").sentence
+
+
+def test_of_a_wrong_start_nothing_is_said():
+    assert explained(None, SCENE.start().move([0.8, 0.5, 0.0], [0.0, 0.0, 2.0])) is None
+
+
+def test_what_is_undone_twice_is_as_before():
+    for mix_up in possible_mix_ups(len(NAMES)):
+        once = mix_up.undo(SCENE.frames(0))
+        twice = mix_up.undo(once)
+        for before, between, after in zip(SCENE.frames(0).views, once.views, twice.views, strict=True):
+            assert (before.rgb == after.rgb).all() and before.camera is between.camera is after.camera
+        changed = [i for i, view in enumerate(once.views) if (view.rgb != SCENE.frames(0).views[i].rgb).any()]
+        assert tuple(changed) == mix_up.cameras
+
+
+def test_a_mix_up_with_a_camera_without_an_image_is_not_undone():
+    dark = Scene(cameras=CAMERAS[:3], is_dark=lambda index, name: name == NAMES[0]).frames(0)
+    undone = [mix_up.undo(dark) is not None for mix_up in possible_mix_ups(len(NAMES))]
+    assert undone == [0 not in mix_up.cameras for mix_up in possible_mix_ups(len(NAMES))]
