@@ -1,9 +1,10 @@
-"""Offsets of the third camera, found from motion and from tracking: `python benchmarks/accuracy/sync.py [--throws]`.
+"""Offsets of the third camera, found from motion and from tracking: `python benchmarks/accuracy/sync.py [--blocks]`.
 
 `generated`: crosses thrown by our generator, the third camera 0 to 20 ms late. `thrown_cross`: the example as it is;
 the third camera's fields resampled to a later time, by mixing the two fields beside each moment; and two cameras
 started whole fields late. `--throws` alone: 20 throws of other seeds, each with a hall, blur and delay (-20 to 20 ms)
-of its own, calibrated from clicked control points; about 20 minutes.
+of its own, calibrated from clicked control points; about 20 minutes. `--blocks` alone: players of 5 synthetic blocks,
+both other cameras' offsets, from up to 30 ms off; about 5 minutes.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ from rows import ROOT, append
 
 from airborne.run.opening import open_cameras, video_source
 from airborne.sync import offsets_by_motion
+from airborne.sync.from_players import offsets_by_players
 from airborne.sync.from_trial import synchronise
+from airborne.synthetic import block_scene, write_block
 from airborne.synthetic.throw.scene import cross_scene
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.file import read_trial
@@ -35,6 +38,7 @@ RESAMPLED_MS = (2, 5, 8, 10, 13, 16, 19)
 WHOLE_FIELDS = ((0, 2, 4), (0, 6, 2), (0, 4, 8))
 FIELD_S = Fraction(1, 50)
 THROW_SEEDS = range(6300, 6320)
+BLOCK_SEEDS = range(9101, 9106)
 EXAMPLE = ROOT / "examples" / "thrown_cross"
 
 
@@ -126,6 +130,33 @@ def measure_throws(scratch: Path) -> None:
     append("sync", [{**data, **rms}, {**data, **held}])
 
 
+def measure_blocks(scratch: Path) -> None:
+    """Measure the offsets of cameras of players, and append the rows."""
+    misses: dict[str, list[tuple[float, float]]] = {"motion": [], "tracking": []}
+    for seed in BLOCK_SEEDS:
+        folder = scratch / f"b{seed}"
+        write_block(folder, block_scene(seed, n_blockers=1 + seed % 3))
+        wrong_s = np.array([0.0, *np.random.default_rng(seed).uniform(-0.03, 0.03, 2)])
+        trial = read_trial(folder / "trial.toml")
+        found = {
+            "motion": synchronise(trial, by="motion", within_s=0.3),
+            "tracking": offsets_by_players(trial, wrong_s),
+        }
+        for method, offsets in found.items():
+            print(seed, np.round(1e3 * wrong_s, 1), offsets.describe(), sep="\n", flush=True)
+            misses[method] += zip(1e3 * offsets.offset_s[1:], 1e3 * offsets.offset_sd_s[1:], strict=True)
+        shutil.rmtree(folder)
+    rows = []
+    for method, pairs in misses.items():
+        error, sd = np.array(pairs).T
+        data = {"data": f"blocks {BLOCK_SEEDS[0]}-{BLOCK_SEEDS[-1]}", "method": method, "n": len(error)}
+        rms = {"metric": "offset error, RMS", "unit": "ms", "value": np.sqrt(np.mean(error**2))}
+        largest = {"metric": "offset error, largest", "unit": "ms", "value": np.abs(error).max()}
+        held = {"metric": "within 2 sd", "unit": "%", "value": 100 * np.mean(np.abs(error) < 2 * sd)}
+        rows += [{**data, **rms}, {**data, **largest}, {**data, **held}]
+    append("sync", rows)
+
+
 def row(data: str, method: str, errors: list[float], floor: str = "") -> dict:
     worst = {"metric": "offset error, largest", "unit": "ms", "value": max(errors), "n": len(errors), "floor": floor}
     return {"data": data, "method": method, **worst}
@@ -137,6 +168,8 @@ def main() -> None:
         at = Path(scratch)
         if "--throws" in sys.argv[1:]:
             return measure_throws(at)
+        if "--blocks" in sys.argv[1:]:
+            return measure_blocks(at)
         generated = []
         for seed, late_ms in LATE_MS:
             scene = replace(cross_scene(seed=seed), time_offsets_s=(0.0, 0.0, late_ms / 1000))

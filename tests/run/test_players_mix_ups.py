@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.cameras import Rig, write_pose2sim
 from airborne.errors import MistakesError
 from airborne.run.check import check_trial
 from airborne.run.players_mix_ups import players_mix_up_in
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
-from tests.support.clips import write_clip
-from tests.support.jumping_scenes import CAMERAS, FPS, Hall, hop
+from tests.support.jumping_scenes import CAMERAS, Hall, hop
 
 NAMES = tuple(camera.name for camera in CAMERAS)
 HALL = Hall({"anna": hop((0.5, 0.0)), "bea": hop((1.2, 0.0), 0.1)})
@@ -76,24 +74,8 @@ def test_where_nobody_stands_nothing_is_said(start):
     assert found(starts, replace(first, views=tuple(empty))) is None
 
 
-def write_trial(folder, order):
-    """Write the hall as a trial whose cameras have the videos of an order; return its path."""
-    files = dict(zip(NAMES, order, strict=True))
-    for i, name in enumerate(NAMES):
-        write_clip(folder / f"{name}.mkv", [HALL.frames(index).views[i].rgb for index in range(3)], rate=FPS)
-    write_pose2sim(folder / "calib.toml", Rig(CAMERAS))
-    lines = ['name = "hall"', *(f'[[camera]]\nname = "{name}"\nvideo = "{files[name]}.mkv"' for name in NAMES)]
-    lines += ['[calibration]\nfile = "calib.toml"\n[body]\npreset = "legs"\n[start]\nframe = 0']
-    for player in HALL.starts():
-        lines += [f'[[start.player]]\nname = "{player.name}"\n[start.player.joints_m]']
-        lines += [f"{joint} = {point.round(4).tolist()}" for joint, point in player.joints_m.items()]
-    path = folder / "trial.toml"
-    path.write_text("\n".join(lines), encoding="utf-8")
-    return path
-
-
 def test_exchanged_files_are_refused_by_check_and_track(tmp_path):
-    path = write_trial(tmp_path, (NAMES[1], NAMES[0], NAMES[2]))
+    path = HALL.write_trial(tmp_path, 3, videos=(NAMES[1], NAMES[0], NAMES[2]))
     said = f"the videos of {NAMES[0]} and {NAMES[1]} are exchanged; exchange them back"
     (mistake,) = check_trial(path).mistakes
     assert mistake.startswith(
@@ -105,6 +87,6 @@ def test_exchanged_files_are_refused_by_check_and_track(tmp_path):
 
 
 def test_files_of_their_own_cameras_are_tracked(tmp_path):
-    path = write_trial(tmp_path, NAMES)
+    path = HALL.write_trial(tmp_path, 3)
     assert not check_trial(path).mistakes
     assert track_trial(read_trial(path), tmp_path / "run", pictures=False).summary["n_frames"] == 3

@@ -4,11 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.cameras import Camera
+from airborne.cameras import Camera, Rig, write_pose2sim
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.first_frame import points_of
@@ -16,6 +17,7 @@ from airborne.tracking.capsules.jumper import JOINTS, N_DOF
 from airborne.tracking.capsules.surface_colours import class_image
 from airborne.tracking.players import PlayerEstimate, PlayerStart
 from airborne.video import Frames, View
+from tests.support.clips import write_clip
 
 SIZE, FPS = (480, 240), 50  # cut out of 640 x 480
 LENGTHS = np.array([0.11, 0.46, 0.31, 0.41, 0.125, 0.45, 0.44, 0.145, 0.07])
@@ -155,6 +157,28 @@ class Hall:
             points: dict[str, np.ndarray] = dict(zip(JOINTS, self.truth(name, index) + off, strict=True))
             starts.append(PlayerStart(name=name, joints_m=points))
         return starts
+
+    def write_trial(
+        self, folder: Path, n: int, *, ahead: Sequence[int] = (0, 0, 0), videos: Sequence[str] | None = None
+    ) -> Path:
+        """Write n frames as a trial, and return its path.
+
+        Each camera's video begins so many frames `ahead` of the first; `videos` names the camera whose video each has.
+        """
+        names = [camera.name for camera in self.cameras]
+        for i, name in enumerate(names):
+            images = [self.frames(index + ahead[i]).views[i] for index in range(n)]
+            write_clip(folder / f"{name}.mkv", [view.rgb for view in images if view is not None], rate=Fraction(FPS))
+        write_pose2sim(folder / "calib.toml", Rig(tuple(self.cameras)))
+        pairs = zip(names, videos or names, strict=True)
+        lines = ['name = "hall"', *(f'[[camera]]\nname = "{name}"\nvideo = "{video}.mkv"' for name, video in pairs)]
+        lines += ['[calibration]\nfile = "calib.toml"\n[body]\npreset = "legs"\n[start]\nframe = 0']
+        for player in self.starts():
+            lines += [f'[[start.player]]\nname = "{player.name}"\n[start.player.joints_m]']
+            lines += [f"{joint} = {point.round(4).tolist()}" for joint, point in player.joints_m.items()]
+        path = folder / "trial.toml"
+        path.write_text("\n".join(lines), encoding="utf-8")
+        return path
 
 
 def tracked(hall: Hall, indices: Sequence[int], starts: list[PlayerStart] | None = None) -> list[list[PlayerEstimate]]:

@@ -1,6 +1,7 @@
 import numpy as np
 
-from airborne.sync.lags import LagEquations, find_lags, solve_lags
+from airborne.sync.lags import find_lags
+from airborne.tracking.camera_lags import LagEquations, solve_lags
 from tests.support.tolerances import EXACT, SOLVED
 
 N, C = 40, 3

@@ -16,7 +16,7 @@ def sync_command(
     *,
     by: Annotated[
         Literal["auto", "flash", "sound", "motion", "tracking"],
-        typer.Option(help="What the offsets come from; auto: motion, then tracking of the body."),
+        typer.Option(help="What the offsets come from; auto: motion, then tracking."),
     ] = "auto",
     within: Annotated[float, typer.Option(min=0.01, max=60, help="Motion: the largest offset searched, in s.")] = 1.0,
     whole_pictures: Annotated[

@@ -15,9 +15,11 @@ from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import open_trial, past_the_end_error
 from airborne.sync import Offsets, image_counter
 from airborne.sync.camera_equations import root_equations, share_equations
-from airborne.sync.lags import CameraLags, LagEquations, find_lags
+from airborne.sync.lags import CameraLags, find_lags
 from airborne.sync.mixed_frames import Blend, blend_of
+from airborne.sync.offsets import with_offsets
 from airborne.tracking import Status
+from airborne.tracking.camera_lags import LagEquations
 from airborne.tracking.methods import sample_body_colours
 from airborne.tracking.model_based.refined import RefinedState, RefinedTracker
 from airborne.tracking.self_check.check import gather_equations
@@ -28,7 +30,7 @@ from airborne.tracking.self_check.times import camera_times
 from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker, compensate_offsets
 from airborne.trial.file import Trial
 from airborne.types import Array, Progress
-from airborne.video import Frames, Recording
+from airborne.video import Frames
 
 _LEAST_FRAMES = 8  # moments at which the body must be tracked to estimate lags
 _MOST_PASSES = 4  # over the recording, with silhouettes
@@ -42,11 +44,9 @@ def offsets_by_tracking(
     """Find the offsets at which every camera's images agree with the body as all cameras together track it.
 
     The recording is tracked several times, from offsets start_s (c,) [s]. A camera whose images blend two moments is
-    excluded from the tracking; its offset is that of the mean moment shown. Raises TrialError for players, and where
-    the body is tracked too rarely.
+    excluded from the tracking; its offset is that of the mean moment shown. Raises TrialError where the body is tracked
+    too rarely.
     """
-    if trial.has_players:
-        raise TrialError("tracking finds offsets from one body; for players use motion, flash or sound")
     method = {"track": trial.track.model_copy(update={"method": "refined"})}
     measure = _Measure(_with_offsets(trial.model_copy(update=method), start_s), start_s, image_counter(progress))
     start = start_s - start_s[0]
@@ -134,7 +134,7 @@ class _Measure:
 
     def __call__(self, lag_s: Array, drift: Array) -> LagEquations:
         """Track with these lags (c,) and drifts (c,); return each camera's own normal equations."""
-        recording = self._with_lags(np.nan_to_num(lag_s), np.nan_to_num(drift))
+        recording = with_offsets(self._recording, self._start_s[0] + np.nan_to_num(lag_s), np.nan_to_num(drift))
         self._last = self._track(_without(frames, self.excluded) for frames in recording)
         if not self.excluded:
             self._appearance_state = self._last.state.inner
@@ -143,7 +143,8 @@ class _Measure:
     def blends(self, lag_s: Array, cameras: Collection[int]) -> list[Blend]:
         """Estimate which moments the images of some cameras show, along the path tracked last."""
         assert self._last is not None and self._appearance_state is not None
-        recording, last = self._with_lags(lag_s, np.zeros_like(lag_s)), self._last
+        last = self._last
+        recording = with_offsets(self._recording, self._start_s[0] + lag_s, np.zeros_like(lag_s))
         moments_s = {i: _MOMENTS_PER_PERIOD / float(recording.facts[i].image_rate) for i in cameras}
         gap_s = 2.5 / float(recording.rate)
         systems: dict[int, list[tuple[Array, Array]]] = {i: [] for i in cameras}
@@ -174,14 +175,6 @@ class _Measure:
         path = TrackedPath(np.array(last.index), np.array(last.time_s), last.poses, np.zeros((n, 6, 6)))
         run = gather_equations(model, rig, path, list(last.kept), body_sd=MEASURED_SD)
         return None if run is None else camera_times(run, rig)
-
-    def _with_lags(self, lag_s: Array, drift: Array) -> Recording:
-        rows = zip(self._recording.sources, self._start_s[0] + lag_s, drift, strict=True)
-        sources = [
-            replace(source, offset_s=round(float(offset), 9), drift_ppm=round(1e6 * float(rate), 6))
-            for source, offset, rate in rows
-        ]
-        return replace(self._recording, sources=tuple(sources))
 
     def _track(self, recording: Iterable[Frames]) -> _TrackedPath:
         trial, model = self._trial, self._trial.model()

@@ -1,8 +1,4 @@
-"""The lag of each camera, from the normal equations of its own images for a body that all cameras track together.
-
-Every camera's images locate the body at the moment they were taken. Over all frames, poses and lags are estimated
-jointly: a lag s moves the body in that camera's images by s times its velocity. Arrays only.
-"""
+"""The lag of each camera, found by tracking again and again with the lags so far."""
 
 from __future__ import annotations
 
@@ -11,25 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airborne.geometry.robust import covariance_of_sum
+from airborne.tracking.camera_lags import LagEquations, solve_lags
 from airborne.types import Array
 
-_N_CORRELATED = 2  # neighbouring frames whose errors are correlated
 _GAIN = 1.6  # a first step is too short by about this factor, as those of the poses are
 _MOST_GAIN = 6.0  # on a step, however nearly parallel the steps before
 _MOST_PASSES = 8  # over the recording
 _CONVERGED_S = 2e-5  # a step below it, or below ...
 _CONVERGED_SDS = 0.1  # ... this share of the lag's sd, ends the iteration
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LagEquations:
-    """Each camera's own normal equations for the pose, at n moments of a tracked body."""
-
-    time_s: Array  # (n,)
-    velocity: Array  # (n, 6) [m/s, rad/s]
-    information: Array  # (n, c, 6, 6) of each camera's log-likelihood at the joint pose; zero where it sees nothing
-    gradient: Array  # (n, c, 6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,34 +55,3 @@ def _secant_gain(taken: Array, change: Array, gain: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         secant = np.where(np.abs(taken) > 3 * _CONVERGED_S, taken / change, gain)
     return np.clip(np.where(np.isfinite(secant) & (secant > 0), secant, gain), 1.0, _MOST_GAIN)
-
-
-def solve_lags(equations: LagEquations, *, with_drift: bool = False) -> tuple[Array, Array]:
-    """Find the lags at time 0, then the drifts, by least squares with the poses' corrections eliminated: (2 c,), sds.
-
-    The sds are those of the sandwich of the frames' own scores, so that they hold however the images' noise is
-    correlated. NaN where a camera saw no motion; drifts are zero without `with_drift`.
-    """
-    n, c = equations.gradient.shape[:2]
-    coupling = np.einsum("kcij,kj->kci", equations.information, equations.velocity)
-    pose_covariance = np.linalg.pinv(equations.information.sum(axis=1), hermitian=True)
-    own = np.einsum("kci,ki->kc", coupling, equations.velocity)[:, :, None] * np.eye(c)
-    H = own - np.einsum("kci,kij,kdj->kcd", coupling, pose_covariance, coupling)
-    r = np.einsum("kci,ki->kc", equations.gradient, equations.velocity)
-    r = r - np.einsum("kci,kij,kj->kc", coupling, pose_covariance, equations.gradient.sum(axis=1))
-    basis = np.stack([np.ones(n), equations.time_s], axis=1)[:, : 2 if with_drift else 1]
-    m = basis.shape[1]
-    H = np.einsum("kcd,ka,kb->kacbd", H, basis, basis).reshape(n, m * c, m * c)
-    r = np.einsum("kc,ka->kac", r, basis).reshape(n, m * c)
-    is_seen = np.diag(H.sum(axis=0)) > 0
-    is_free = np.tile(np.arange(c) != np.argmax(is_seen[:c]), m)
-    index = np.flatnonzero(is_free & is_seen)
-    inverse = np.linalg.inv(H.sum(axis=0)[np.ix_(index, index)])
-    solution = inverse @ r.sum(axis=0)[index]
-    scores = r[:, index] - H[:, index][:, :, index] @ solution
-    step, sd = np.zeros(2 * c), np.zeros(2 * c)
-    unseen = np.flatnonzero(is_free & ~is_seen)
-    step[unseen] = sd[unseen] = np.nan
-    covariance = inverse @ covariance_of_sum(scores, _N_CORRELATED) @ inverse
-    step[index], sd[index] = solution, np.sqrt(np.maximum(np.diag(covariance), 0))
-    return step, sd

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from airborne.types import Array, Progress
+from airborne.video import Recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +43,16 @@ class Offsets:
             line = f"{name}: offset {1000 * offset:+.2f} ms (sd {1000 * sd:.2f})"
             lines.append(line + (f", drift {1e6 * drift:+.1f} ppm (sd {1e6 * drift_sd:.1f})" if drift else ""))
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+
+
+def with_offsets(recording: Recording, offset_s: Array, drift: Array) -> Recording:
+    """Return a recording whose cameras have these offsets (c,) [s] and drifts (c,) [s/s]."""
+    rows = zip(recording.sources, offset_s, drift, strict=True)
+    sources = [
+        replace(source, offset_s=round(float(offset), 9), drift_ppm=round(1e6 * float(rate), 6))
+        for source, offset, rate in rows
+    ]
+    return replace(recording, sources=tuple(sources))
 
 
 def fit_line(time_s: Array, offset_s: Array, sd_s: Array, *, with_drift: bool) -> tuple[float, float, float, float]:

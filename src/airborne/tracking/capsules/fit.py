@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ _POSTURE_SD = np.array([0.2, 0.5, 0.3, 0.15] + [0.25, 0.3, 0.4] * 2 + [0.5, 0.6]
 _POSTURE = np.zeros((len(_POSTURE_SD), N_DOF))
 _POSTURE[np.arange(10), [4, 5, 6, 7, 9, 10, 12, 14, 15, 17]] = 1  # side and forward lean, bends, hip y and z, ankle
 _POSTURE[10, [8, 13]] = _POSTURE[11, [11, 16]] = 1, -1  # hip and knee flexion, left less right
-_POSTURE_INFORMATION = _POSTURE.T @ (_POSTURE / _POSTURE_SD[:, None] ** 2)
+POSTURE_INFORMATION = _POSTURE.T @ (_POSTURE / _POSTURE_SD[:, None] ** 2)
 _REST_POSE = np.zeros(N_DOF)
 _REST_POSE[5] = 0.25  # [rad] the trunk leans forward
 
@@ -88,7 +88,7 @@ def fit_jumper(
     images, owned = _images(region_maps, others)
     anchors = np.full((N_POINTS, 3), np.nan) if prior.anchors is None else prior.anchors
     sd_m = np.ones(N_POINTS) if prior.anchor_sd_m is None else prior.anchor_sd_m
-    priors = _Priors(prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m, _POSTURE_INFORMATION)
+    priors = _Priors(prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m, POSTURE_INFORMATION)
     weight = _pixel_weight(region_maps)
     best = _maximise(
         _allocate_iterate(state, n, owned), _allocate_iterate(state, n, owned), priors, images, weight, most_steps
@@ -111,6 +111,24 @@ def evidence_of(state: Array, region_maps: RegionMaps, others: Capsules) -> floa
     """Return the evidence of a state [nat], without any prior."""
     images, owned = _images(region_maps, others)
     return _pixel_weight(region_maps) * accumulate_equations(state, 0, images, owned, Equations.of(N_POINTS, 0))
+
+
+def view_equations(state: Array, region_maps: RegionMaps, others: Capsules, n: int) -> tuple[Array, Array]:
+    """Return what each view alone says of a state's first n numbers: information (v, n, n), gradient (v, n) [nat]."""
+    weight, v = _pixel_weight(region_maps), len(region_maps.cameras)
+    information, gradient = np.zeros((v, n, n)), np.zeros((v, n))
+    for k in range(v):
+        one = replace(
+            region_maps,
+            cameras=region_maps.cameras[k : k + 1],
+            sums=region_maps.sums[k : k + 1],
+            contrast=region_maps.contrast[k : k + 1],
+        )
+        images, owned = _images(one, others)
+        equations = Equations.of(N_POINTS, n)
+        accumulate_equations(state, n, images, owned, equations)
+        information[k], gradient[k] = weight * _SLOPE * equations.curvature, weight * equations.gradient
+    return information, gradient
 
 
 def _images(region_maps: RegionMaps, others: Capsules) -> tuple[Images, Array]:
