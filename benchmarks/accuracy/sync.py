@@ -4,7 +4,8 @@
 the third camera's fields resampled to a later time, by mixing the two fields beside each moment; and two cameras
 started whole fields late. `--throws` alone: 20 throws of other seeds, each with a hall, blur and delay (-20 to 20 ms)
 of its own, calibrated from clicked control points; about 20 minutes. `--blocks` alone: players of 5 synthetic blocks,
-both other cameras' offsets, from up to 30 ms off; about 5 minutes.
+both other cameras' offsets, from up to 30 ms off, and which cameras runs name where one is 20 ms late or none is; about
+6 minutes.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -22,14 +24,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.run.opening import open_cameras, video_source
+from airborne.run.opening import open_cameras, open_trial, video_source
+from airborne.run.players import PlayersRun
 from airborne.sync import offsets_by_motion
 from airborne.sync.from_players import offsets_by_players
 from airborne.sync.from_trial import synchronise
 from airborne.synthetic import block_scene, write_block
 from airborne.synthetic.throw.scene import cross_scene
 from airborne.synthetic.throw.writing import write_trial
-from airborne.trial.file import read_trial
+from airborne.trial.file import Trial, read_trial
 from airborne.video import VideoWriter, fill_rows, weave
 from airborne.video.decoding import decode, inspect, rgb_from_decoded
 
@@ -130,9 +133,20 @@ def measure_throws(scratch: Path) -> None:
     append("sync", [{**data, **rms}, {**data, **held}])
 
 
+def accused(trial: Trial, late_s: Sequence[float]) -> list[str]:
+    """Return the cameras whose times a run of players names as wrong, if its cameras' times are late (c,) [s]."""
+    cameras = [camera.model_copy(update={"offset_s": s}) for camera, s in zip(trial.camera, late_s, strict=True)]
+    trial = trial.model_copy(update={"camera": cameras})
+    run = PlayersRun.open(trial, open_trial(trial))
+    for _ in run.track(iter(run.recording), lambda step: None, {}, lambda n: None):
+        pass
+    return [said.split()[1] for said in run.clocks.describe(run.recording.rig.names)]
+
+
 def measure_blocks(scratch: Path) -> None:
     """Measure the offsets of cameras of players, and append the rows."""
     misses: dict[str, list[tuple[float, float]]] = {"motion": [], "tracking": []}
+    n_named, n_wrong = 0, 0
     for seed in BLOCK_SEEDS:
         folder = scratch / f"b{seed}"
         write_block(folder, block_scene(seed, n_blockers=1 + seed % 3))
@@ -145,8 +159,17 @@ def measure_blocks(scratch: Path) -> None:
         for method, offsets in found.items():
             print(seed, np.round(1e3 * wrong_s, 1), offsets.describe(), sep="\n", flush=True)
             misses[method] += zip(1e3 * offsets.offset_s[1:], 1e3 * offsets.offset_sd_s[1:], strict=True)
+        for late_s in (np.zeros(3), *0.02 * np.eye(3)):
+            named, late = accused(trial, late_s.tolist()), [f"cam{i + 1}" for i in np.flatnonzero(late_s)]
+            print(seed, late, "named", named, flush=True)
+            n_named, n_wrong = n_named + (named == late != []), n_wrong + len(set(named) - set(late))
         shutil.rmtree(folder)
-    rows = []
+    data = {"data": f"blocks {BLOCK_SEEDS[0]}-{BLOCK_SEEDS[-1]}", "method": "self-check"}
+    n = 3 * len(BLOCK_SEEDS)
+    rows = [
+        {**data, "metric": "camera 20 ms late named, alone", "unit": f"of {n}", "value": n_named, "n": n},
+        {**data, "metric": "right camera named", "unit": f"of {3 * n}", "value": n_wrong, "n": 3 * n},
+    ]
     for method, pairs in misses.items():
         error, sd = np.array(pairs).T
         data = {"data": f"blocks {BLOCK_SEEDS[0]}-{BLOCK_SEEDS[-1]}", "method": method, "n": len(error)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,10 @@ from airborne.motion.jumps.heights import LEAST_RATE_HZ, measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
+from airborne.run.players_clocks import ClockCheck
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
 from airborne.tracking import Status
+from airborne.tracking.capsules import Blocker
 from airborne.tracking.players import PlayersStep, PlayerStart, PlayersTracker, StepTracker
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
@@ -50,6 +52,7 @@ class PlayersRun:
     calibration: Calibration | None
     players: PlayersTracker
     starts: tuple[PlayerStart, ...]
+    clocks: ClockCheck = field(default_factory=ClockCheck)  # grows while the run is tracked
 
     table = JOINTS
 
@@ -90,7 +93,10 @@ class PlayersRun:
         tick: Callable[[int], None],
     ) -> Iterator[tuple[Frames, PlayersStep]]:
         """Yield each time's frames with the players' step there, written."""
-        return track_frames(StepTracker(self.players, self._is_slow), frames, write, done)
+        for observed, step in track_frames(StepTracker(self.players, self._is_slow), frames, write, done):
+            if isinstance(self.players, Blocker) and isinstance(self.recording, Recording):
+                self.clocks.add(observed, step)
+            yield observed, step
 
     def writer(self, folder: Path, *, resume: bool) -> PlayersWriter:
         """Return what writes the estimates; rows that are there already stay."""
@@ -162,7 +168,8 @@ class PlayersRun:
         """Return what a reader of the numbers must know."""
         method = self.trial.track.method
         slow = [_SLOW.format(rate=float(self.recording.rate), least=LEAST_RATE_HZ)] if self._is_slow else []
-        return slow if method == "blocker" else [*slow, _OVERCONFIDENT.format(method=method)]
+        said = [] if method == "blocker" else [_OVERCONFIDENT.format(method=method)]
+        return [*slow, *said, *self.clocks.describe(self.recording.rig.names)]
 
     @property
     def _is_slow(self) -> bool:

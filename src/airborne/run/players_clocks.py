@@ -1,0 +1,50 @@
+"""Cameras of players whose times are wrong, by what each camera alone says of the players whom all of them track."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from airborne.geometry.even_sample import EvenSample
+from airborne.tracking import Status
+from airborne.tracking.camera_lags import solve_lags
+from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, moment_of
+from airborne.tracking.players import PlayersStep
+from airborne.video import Frames
+
+_MOST_MOMENTS, _FEWEST_MOMENTS = 100, 20  # of a player that are kept; of all that say something
+_EVERY = 2  # frames from one to the next: neighbours err alike, and a moment costs a tenth of a frame's tracking
+_ALARM_SDS = 3.0  # chosen: as of a body, one in 370 right cameras is accused
+_LEAST_S = 0.003  # chosen: a body at 10 m/s moves 3 cm, as much as a joint is off
+
+
+class ClockCheck:
+    """What cameras say of the players at some moments of a run, spread evenly over it."""
+
+    def __init__(self) -> None:
+        self._moments: defaultdict[str, EvenSample[Moment]] = defaultdict(lambda: EvenSample(_MOST_MOMENTS))
+
+    def add(self, frames: Frames, step: PlayersStep) -> None:
+        """Keep a time of the tracker `Blocker`, or not."""
+        for each in step.players:
+            if each.status is not Status.LOST and frames.index % _EVERY == 0:
+                self._moments[each.player].offer(lambda name=each.player: moment_of(step.state, name, frames))
+
+    def describe(self, names: Sequence[str]) -> list[str]:
+        """Say which cameras' times are wrong; `names` are the rig's, whose first one is the clock."""
+        moments = [moment for each in self._moments.values() for moment in each]
+        n = len(names)
+        if len(moments) < _FEWEST_MOMENTS or n < 2:
+            return []
+        lag_s, sd_s = (each[:n] for each in solve_lags(lag_equations(moments)))
+        is_off = np.abs(np.nan_to_num(lag_s)) > np.maximum(_ALARM_SDS * np.nan_to_num(sd_s), _LEAST_S)
+        if n > 2 and is_off[1:].all() and len(set(np.sign(lag_s[1:]))) == 1:  # all but the clock agree
+            lag_s, is_off = np.array([-lag_s[1:].mean(), *[0.0] * (n - 1)]), np.arange(n) == 0
+        return [
+            f"self-check: {name} shows the players {1e3 * abs(lag):.0f} ms or more "
+            f"{'later' if lag > 0 else 'earlier'} than its times say; `airborne sync` finds by how much"
+            for name, lag, off in zip(names, lag_s, is_off, strict=True)
+            if off
+        ]
