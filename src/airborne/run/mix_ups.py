@@ -122,7 +122,10 @@ class MixUp:
             both = join_names(cameras)
             advice = f"the videos of {both} are exchanged; exchange them back"
             return Finding(kind="swapped", what=what, advice=advice, cameras=cameras)
-        advice = f"the images of {cameras[0]} are mirrored; switch that off in the camera, and record or convert anew"
+        advice = (
+            f"the images of {cameras[0]} are mirrored; switch that off in the camera, and record or convert anew, or "
+            "calibrate it anew if it was moved"
+        )
         return Finding(kind="mirrored", what=what, advice=advice, cameras=cameras)
 
 
