@@ -14,7 +14,7 @@ from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, mo
 from airborne.tracking.players import PlayersStep
 from airborne.video import Frames
 
-_MOST_MOMENTS, _FEWEST_MOMENTS = 100, 20  # of a player that are kept; of all that say something
+_MOST_MOMENTS, _FEWEST_TIMES = 100, 20  # of a player that are kept; of all that say something
 _EVERY = 2  # frames from one to the next: neighbours err alike, and a moment costs a tenth of a frame's tracking
 _ALARM_SDS = 3.0  # chosen: as of a body, one in 370 right cameras is accused
 _LEAST_S = 0.003  # chosen: a body at 10 m/s moves 3 cm, as much as a joint is off
@@ -25,18 +25,20 @@ class ClockCheck:
 
     def __init__(self) -> None:
         self._moments: defaultdict[str, EvenSample[Moment]] = defaultdict(lambda: EvenSample(_MOST_MOMENTS))
+        self._n_times = 0
 
     def add(self, frames: Frames, step: PlayersStep) -> None:
         """Keep a time of the tracker `Blocker`, or not."""
-        for each in step.players:
-            if each.status is not Status.LOST and frames.index % _EVERY == 0:
-                self._moments[each.player].offer(lambda name=each.player: moment_of(step.state, name, frames))
+        self._n_times += 1
+        found = [each for each in step.players if each.status is not Status.LOST]
+        for each in found if self._n_times % _EVERY == 0 else ():
+            self._moments[each.player].offer(lambda name=each.player: moment_of(step.state, name, frames))
 
     def describe(self, names: Sequence[str]) -> list[str]:
         """Say which cameras' times are wrong; `names` are the rig's, whose first one is the clock."""
         moments = [moment for each in self._moments.values() for moment in each]
         n = len(names)
-        if len(moments) < _FEWEST_MOMENTS or n < 2:
+        if len({moment.time_s for moment in moments}) < _FEWEST_TIMES or n < 2:
             return []
         lag_s, sd_s = (each[:n] for each in solve_lags(lag_equations(moments)))
         is_off = np.abs(np.nan_to_num(lag_s)) > np.maximum(_ALARM_SDS * np.nan_to_num(sd_s), _LEAST_S)

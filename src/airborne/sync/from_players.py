@@ -45,9 +45,9 @@ def offsets_by_players(
                     moments[each.player].append(moment_of(state, each.player, frames))
             on_image()
         found = [moment for each in moments.values() for moment in each]
-        if len(found) < _LEAST_MOMENTS:
+        if (n := len({moment.time_s for moment in found})) < _LEAST_MOMENTS:
             raise TrialError(
-                f"players were found at {len(found)} moments; the offsets need at least {_LEAST_MOMENTS}; check "
+                f"players were found at {n} moments; the offsets need at least {_LEAST_MOMENTS}; check "
                 "[[start.player]], or synchronise by motion, flash or sound first"
             )
         return lag_equations(found)
