@@ -140,7 +140,7 @@ def accused(trial: Trial, late_s: Sequence[float]) -> list[str]:
     run = PlayersRun.open(trial, open_trial(trial))
     for _ in run.track(iter(run.recording), lambda step: None, {}, lambda n: None):
         pass
-    return [said.split()[1] for said in run.clocks.describe(run.recording.rig.names)]
+    return [said.split()[1] for said in run.cameras.describe(run.recording.rig.names)]
 
 
 def measure_blocks(scratch: Path) -> None:

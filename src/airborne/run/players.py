@@ -18,7 +18,7 @@ from airborne.motion.jumps.heights import LEAST_RATE_HZ, measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
-from airborne.run.players_clocks import ClockCheck
+from airborne.run.players_cameras import CameraCheck
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
@@ -52,7 +52,7 @@ class PlayersRun:
     calibration: Calibration | None
     players: PlayersTracker
     starts: tuple[PlayerStart, ...]
-    clocks: ClockCheck = field(default_factory=ClockCheck)  # grows while the run is tracked
+    cameras: CameraCheck = field(default_factory=CameraCheck)  # grows while the run is tracked
 
     table = JOINTS
 
@@ -95,7 +95,7 @@ class PlayersRun:
         """Yield each time's frames with the players' step there, written."""
         for observed, step in track_frames(StepTracker(self.players, self._is_slow), frames, write, done):
             if isinstance(self.players, Blocker) and isinstance(self.recording, Recording):
-                self.clocks.add(observed, step)
+                self.cameras.add(observed, step)
             yield observed, step
 
     def writer(self, folder: Path, *, resume: bool) -> PlayersWriter:
@@ -169,7 +169,7 @@ class PlayersRun:
         method = self.trial.track.method
         slow = [_SLOW.format(rate=float(self.recording.rate), least=LEAST_RATE_HZ)] if self._is_slow else []
         said = [] if method == "blocker" else [_OVERCONFIDENT.format(method=method)]
-        return [*slow, *said, *self.clocks.describe(self.recording.rig.names)]
+        return [*slow, *said, *self.cameras.describe(self.recording.rig.names)]
 
     @property
     def _is_slow(self) -> bool:

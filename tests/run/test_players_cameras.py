@@ -1,10 +1,12 @@
-"""Cameras of players whose times are wrong: named at the end of a run, with the direction, and right ones are not."""
+"""Cameras of players that are wrong, in their times or their place: named at the end of a run; right ones are not."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.run.players_clocks import ClockCheck
+from airborne.run.players_cameras import CameraCheck
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.players import StepTracker
 from tests.support.jumping_scenes import Hall, hop
@@ -12,12 +14,18 @@ from tests.support.jumping_scenes import Hall, hop
 HALL, NAMES, N = Hall({"anna": hop()}), ("cam0", "cam1", "cam2"), 46
 
 
-def described(ahead, cameras=3, names=NAMES, n=N):
+def turned(camera, angle_deg):
+    turn = RigidTransform.from_rotation(Rotation.from_rotvec([0, np.radians(angle_deg), 0]))
+    return replace(camera, camera_from_world=turn * camera.camera_from_world)
+
+
+def described(ahead, cameras=3, names=NAMES, n=N, turn_deg=(0, 0, 0)):
     """What is said of a run whose cameras' images come from so many frames ahead of their times."""
-    tracker, check = StepTracker(Blocker(HALL.starts())), ClockCheck()
+    tracker, check = StepTracker(Blocker(HALL.starts())), CameraCheck()
     state = tracker.init()
     for index in range(2, n):
-        views = tuple(HALL.frames(index + ahead[i]).views[i] for i in range(cameras))
+        views = [HALL.frames(index + ahead[i]).views[i] for i in range(cameras)]
+        views = tuple(replace(each, camera=turned(each.camera, turn_deg[i])) for i, each in enumerate(views))
         frames = replace(HALL.frames(index), views=views)
         step = tracker.search(state, frames)
         check.add(frames, step)
@@ -37,6 +45,14 @@ def test_the_camera_that_is_a_frame_off_is_named(ahead, camera, direction):
     (said,) = described(ahead)
     assert said.startswith(f"self-check: {camera} shows the players ")
     assert said.endswith(f" ms or more {direction} than its times say; `airborne sync` finds by how much")
+
+
+@pytest.mark.parametrize("i", [0, 2])
+def test_a_camera_that_was_turned_is_named(i):
+    said = described((0, 0, 0), turn_deg=[2 if k == i else 0 for k in range(3)])
+    assert any(
+        f"{NAMES[i]} shows the players where the other cameras see them in 0% of the frames" in each for each in said
+    )
 
 
 def test_of_one_camera_or_of_few_frames_nothing_is_said():
