@@ -92,16 +92,16 @@ def _check_legs(start: PlayerStart) -> None:
 
 def _check_facing(start: PlayerStart) -> None:
     """Raise ValueError where knees bend or feet point backward, seen from the hips."""
-    hips = [start.joints_m[f"hip_{side}"] for side in ("left", "right")]
-    forward = np.cross(hips[0] - hips[1], [0.0, 0.0, 1.0])
+    joints_m = start.joints_m
+    forward = np.cross(joints_m["hip_left"] - joints_m["hip_right"], [0.0, 0.0, 1.0])
     forward /= max(np.linalg.norm(forward), 1e-9)
     bends, feet = [], []
-    for side, hip in zip(("left", "right"), hips, strict=True):
-        knee, ankle, foot = (start.joints_m.get(f"{part}_{side}") for part in ("knee", "ankle", "foot"))
+    for side in ("left", "right"):
+        hip, knee, ankle = (joints_m[f"{part}_{side}"] for part in ("hip", "knee", "ankle"))
         shin = (ankle - hip) / max(np.linalg.norm(ankle - hip), 1e-9)
         bends.append((knee - hip - (knee - hip) @ shin * shin) @ forward)
-        if foot is not None:
-            feet.append((foot - ankle) @ forward)
+        if f"foot_{side}" in joints_m:
+            feet.append((joints_m[f"foot_{side}"] - ankle) @ forward)
     for what, distances in (("the knees bend", bends), ("the feet point", feet)):
         behind_m = -float(np.mean(distances or [0.0]))
         if behind_m > _MOST_BEHIND_M:
