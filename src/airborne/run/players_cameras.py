@@ -18,7 +18,7 @@ from airborne.video import Frames
 _MOST_MOMENTS, _FEWEST_TIMES = 100, 20  # of a player that are kept; of all that say something
 _EVERY = 2  # frames from one to the next: neighbours err alike, and a moment costs a tenth of a frame's tracking
 _ALARM_SDS = 3.0  # chosen: as of a body, one in 370 right cameras is accused
-# share of the times in which a camera shows the players as the others see them: of 12 synthetic recordings with three
+# share of the times in which a camera shows the players as the others see them: of ten synthetic recordings with three
 # cameras 0.6 or more, of one turned by half a degree or more 0 to 0.34
 _HARDLY, _MOSTLY = 0.15, 0.5
 _LEAST_S = 0.003  # chosen: a body at 10 m/s moves 3 cm, as much as a joint is off
