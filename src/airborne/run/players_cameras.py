@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,15 +11,15 @@ from airborne.geometry.even_sample import EvenSample
 from airborne.tracking import Status
 from airborne.tracking.camera_lags import solve_lags
 from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, moment_of
-from airborne.tracking.capsules.occlusion import count_unoccluded
+from airborne.tracking.capsules.occlusion import shows_player
 from airborne.tracking.players import PlayersStep
 from airborne.video import Frames
 
-_MOST_MOMENTS, _FEWEST_TIMES = 100, 20  # of a player that are kept; of all that say something
-_EVERY = 2  # frames from one to the next: neighbours err alike, and a moment costs a tenth of a frame's tracking
+_MOST_MOMENTS, _FEWEST_TIMES = 100, 20  # chosen: of a player that are kept; of all that say something
+_EVERY = 2  # chosen, frames apart: neighbours err alike, and a moment costs a tenth of a frame's tracking
 _ALARM_SDS = 3.0  # chosen: as of a body, one in 370 right cameras is accused
-# share of the times in which a camera shows the players as the others see them: of ten synthetic recordings with three
-# cameras 0.6 or more, of one turned by half a degree or more 0 to 0.34
+# chosen: share of the times in which a camera shows the players as the others see them; in ten synthetic recordings
+# with three cameras 0.6 or more, of one turned by half a degree or more 0 to 0.34
 _HARDLY, _MOSTLY = 0.15, 0.5
 _LEAST_S = 0.003  # chosen: a body at 10 m/s moves 3 cm, as much as a joint is off
 
@@ -30,16 +30,18 @@ class CameraCheck:
     def __init__(self) -> None:
         self._moments: defaultdict[str, EvenSample[Moment]] = defaultdict(lambda: EvenSample(_MOST_MOMENTS))
         self._n_times = 0
-        self._shown: defaultdict[int, list[bool]] = defaultdict(list)  # by camera: whether it shows a player found
+        self._n_found: Counter[int] = Counter()  # by camera: players found while it had an image
+        self._n_shown: Counter[int] = Counter()  # and those of them that it shows
 
     def add(self, frames: Frames, step: PlayersStep) -> None:
         """Keep a time of the tracker `Blocker`, or not."""
         self._n_times += 1
         found = [each for each in step.players if each.status is not Status.LOST]
         for each in found:
-            occlusion = step.state.players[each.player].colours.occlusion
-            for view in (i for i, view in enumerate(frames.views) if view is not None):
-                self._shown[view].append(count_unoccluded(occlusion, [view]) > 0)
+            is_shown = shows_player(step.state.players[each.player].colours.occlusion)
+            seeing = [i for i, view in enumerate(frames.views) if view is not None]
+            self._n_found.update(seeing)
+            self._n_shown.update(i for i in seeing if is_shown[i])
         for each in found if self._n_times % _EVERY == 0 else ():
             self._moments[each.player].offer(lambda name=each.player: moment_of(step.state, name, frames))
 
@@ -51,7 +53,7 @@ class CameraCheck:
         return self._describe_shown(names) or self._describe_times(names)
 
     def _describe_shown(self, names: Sequence[str]) -> list[str]:
-        shares = {name: float(np.mean(self._shown[i])) for i, name in enumerate(names) if self._shown[i]}
+        shares = {names[i]: self._n_shown[i] / n for i, n in sorted(self._n_found.items())}
         others = sum(share > _MOSTLY for share in shares.values())
         return [
             f"self-check: {name} shows the players where the other cameras see them in {share:.0%} of the frames: was "

@@ -26,7 +26,7 @@ from airborne.video import Frames, Recording
 # without a mix-up. Chosen on twelve synthetic blocks of 9001 to 9103 and block_jump: of 72 mix-ups 62 are named, and in
 # 235 recordings with at most one camera turned by 0.5 to 2 degrees 2
 _MORE, _LEAST_EVIDENCE, _LEAST_SHOWN = 1.3, 1.5, 0.5
-_MANY = 10.0  # times, of which the figure says nothing more
+_MANY = 10.0  # chosen: times, of which the figure says nothing more
 
 
 def refuse_players_mix_ups(starts: Sequence[PlayerStart], recording: Recording) -> None:
@@ -44,9 +44,9 @@ def players_mix_up_in(starts: Sequence[PlayerStart], first: Frames) -> Finding |
     Nothing is tried where three cameras or more all show the players; of two, none could be told from the other.
     """
     with_legs = [start for start in starts if start.has_legs]
-    named = _fit(with_legs, first)
     n_views = sum(view is not None for view in first.views)
-    if not named or n_views < 2 or (_shown(named, first) == 1 and n_views > 2):
+    named = _fit(with_legs, first) if n_views > 1 else []
+    if not named or (_shown(named, first) == 1 and n_views > 2):
         return None
     nats, names = max(_nats(named), 1.0), [view.camera.name if view else "" for view in first.views]
     best, most, found = None, _MORE, named

@@ -9,17 +9,15 @@ import numpy as np
 from airborne.errors import TrialError
 from airborne.run.opening import open_trial
 from airborne.run.players_tracker import player_starts
-from airborne.sync.lags import find_lags
+from airborne.sync.lags import LEAST_MOMENTS, find_lags
 from airborne.sync.offsets import Offsets, image_counter, with_offsets
+from airborne.sync.silhouettes import MOST_IMAGES
 from airborne.tracking import Status
 from airborne.tracking.camera_lags import LagEquations
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, moment_of
 from airborne.trial.file import Trial
 from airborne.types import Array, Progress
-
-_MOST_FRAMES = 1500  # tracked in each pass, as many as motion reads
-_LEAST_MOMENTS = 8  # at which a player must be tracked
 
 
 def offsets_by_players(
@@ -38,23 +36,20 @@ def offsets_by_players(
         moments: dict[str, list[Moment]] = {start.name: [] for start in starts if start.has_legs}
         tracker = Blocker(starts)
         state = tracker.init()
-        for frames in islice(now, _MOST_FRAMES):
+        for frames in islice(now, MOST_IMAGES):
             state, estimates = tracker.step(state, frames)
             for each in estimates:
                 if each.status is not Status.LOST:
                     moments[each.player].append(moment_of(state, each.player, frames))
             on_image()
         found = [moment for each in moments.values() for moment in each]
-        if (n := len({moment.time_s for moment in found})) < _LEAST_MOMENTS:
+        if (n := len({moment.time_s for moment in found})) < LEAST_MOMENTS:
             raise TrialError(
-                f"players were found at {n} moments; the offsets need at least {_LEAST_MOMENTS}; check "
+                f"players were found at {n} moments; the offsets need at least {LEAST_MOMENTS}; check "
                 "[[start.player]], or synchronise by motion, flash or sound first"
             )
         return lag_equations(found)
 
     lags = find_lags(measure, start_s - start_s[0], with_drift=with_drift)
-    unknown = [name for name, lag_s in zip(recording.rig.names, lags.lag_s, strict=True) if not np.isfinite(lag_s)]
-    if unknown:
-        raise TrialError(f"{', '.join(unknown)}: never sees the players move; synchronise by flash or sound")
     how = "by tracking: every camera's pixels against the players as all of them see these"
-    return Offsets(recording.rig.names, start_s[0] + lags.lag_s, lags.sd_s, lags.drift, lags.drift_sd, how=how)
+    return lags.to_offsets(recording.rig.names, float(start_s[0]), who="the players", how=how)

@@ -15,7 +15,7 @@ from airborne.run.first_pose import find_first_pose
 from airborne.run.opening import open_trial, past_the_end_error
 from airborne.sync import Offsets, image_counter
 from airborne.sync.camera_equations import root_equations, share_equations
-from airborne.sync.lags import CameraLags, find_lags
+from airborne.sync.lags import LEAST_MOMENTS, CameraLags, find_lags
 from airborne.sync.mixed_frames import Blend, blend_of
 from airborne.sync.offsets import with_offsets
 from airborne.tracking import Status
@@ -32,7 +32,6 @@ from airborne.trial.file import Trial
 from airborne.types import Array, Progress
 from airborne.video import Frames
 
-_LEAST_FRAMES = 8  # moments at which the body must be tracked to estimate lags
 _MOST_PASSES = 4  # over the recording, with silhouettes
 _CONVERGED_SDS = 0.15  # a step of theirs below this share of its sd ends the iteration
 _MOMENTS_PER_PERIOD = np.arange(-3, 4) / 2  # that an image may show [its period]
@@ -62,11 +61,8 @@ def offsets_by_tracking(
         else:
             lags = _lags_beside_mixed(measure, lags, mixed, start=start, with_drift=with_drift)
             notes = [f"{listed}: the images are mixed from two moments; the offset is that of their mean"]
-    unknown = [name for name, lag_s in zip(names, lags.lag_s, strict=True) if not np.isfinite(lag_s)]
-    if unknown:
-        raise TrialError(f"{', '.join(unknown)}: never sees the tracked body move; synchronise by flash or sound")
     how = "by tracking: every camera's images against the body as all of them see it"
-    return Offsets(names, start_s[0] + lags.lag_s, lags.sd_s, lags.drift, lags.drift_sd, how=how, notes=tuple(notes))
+    return lags.to_offsets(names, float(start_s[0]), who="the tracked body", how=how, notes=notes)
 
 
 def _lags_by_silhouettes(measure: _Measure, lag_s: Array) -> CameraLags | None:
@@ -200,10 +196,10 @@ class _Measure:
             self._on_image()
         if tracked is None:
             raise past_the_end_error(trial, self._recording)
-        if len(tracked.poses) < _LEAST_FRAMES:
+        if len(tracked.poses) < LEAST_MOMENTS:
             raise TrialError(
                 f"{trial.name}: the body was tracked at {len(tracked.poses)} moments; the lags need at least "
-                f"{_LEAST_FRAMES}; check [start], or synchronise by motion, flash or sound first"
+                f"{LEAST_MOMENTS}; check [start], or synchronise by motion, flash or sound first"
             )
         return tracked
 

@@ -25,7 +25,7 @@ from airborne.video import VideoSource, inspect
 By = Literal["auto", "flash", "sound", "motion", "tracking"]
 
 _DECIMALS = 6  # of seconds, as written
-# of what moves where several people do: the errors' root mean square on 13 of the synthetic blocks 9001 to 9023
+# chosen, of what moves where several people do: the errors' root mean square on 13 of the synthetic blocks 9001 to 9023
 _SEVERAL_PEOPLE_SD_S = 0.011
 _KEYS = ("offset_s", "offset_sd_s", "drift_ppm")
 

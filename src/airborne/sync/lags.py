@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from airborne.errors import TrialError
+from airborne.sync.offsets import Offsets
 from airborne.tracking.camera_lags import LagEquations, solve_lags
 from airborne.types import Array
 
+LEAST_MOMENTS = 8  # chosen: at which somebody must be tracked, so that lags can be found
 _GAIN = 1.6  # a first step is too short by about this factor, as those of the poses are
 _MOST_GAIN = 6.0  # on a step, however nearly parallel the steps before
 _MOST_PASSES = 8  # over the recording
@@ -25,6 +28,16 @@ class CameraLags:
     sd_s: Array  # (c,)
     drift: Array  # (c,) [s/s]; the lag holds at time 0
     drift_sd: Array  # (c,)
+
+    def to_offsets(
+        self, names: Sequence[str], first_s: float, *, who: str, how: str, notes: Sequence[str] = ()
+    ) -> Offsets:
+        """Return them as offsets, the first camera's [s] given; raises TrialError where one never sees `who` move."""
+        unknown = [name for name, lag_s in zip(names, self.lag_s, strict=True) if not np.isfinite(lag_s)]
+        if unknown:
+            raise TrialError(f"{', '.join(unknown)}: never sees {who} move; synchronise by flash or sound")
+        offset_s = first_s + self.lag_s
+        return Offsets(tuple(names), offset_s, self.sd_s, self.drift, self.drift_sd, how=how, notes=tuple(notes))
 
 
 def find_lags(measure: Callable[[Array, Array], LagEquations], lag_s: Array, *, with_drift: bool = False) -> CameraLags:

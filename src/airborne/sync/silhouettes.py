@@ -28,7 +28,7 @@ from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, decod
 OnImage = Callable[[], None]
 
 _WIDTH_PX = 320  # of the images compared [px]
-_MOST_IMAGES = 1500  # images read
+MOST_IMAGES = 1500  # images read
 _N_BACKGROUND = 60  # images that the median is made of
 _LEAST_SDS = 5.0  # robust sds of the static scene
 _LEAST_GREY = 8.0  # grey levels by which something must differ in any case
@@ -88,7 +88,7 @@ def silhouettes_of(source: VideoSource, camera: Camera, on_image: OnImage = lamb
         small.append(_shrink(image, facts))
         parities.append(image.parity)
         on_image()
-        if len(times) == _MOST_IMAGES:
+        if len(times) == MOST_IMAGES:
             break
     hulls: list[Array] = [np.zeros((0, 3))] * len(times)
     for parity in set(parities):

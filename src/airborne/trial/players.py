@@ -98,8 +98,8 @@ def _check_facing(start: PlayerStart) -> None:
     bends, feet = [], []
     for side in ("left", "right"):
         hip, knee, ankle = (joints_m[f"{part}_{side}"] for part in ("hip", "knee", "ankle"))
-        shin = (ankle - hip) / max(np.linalg.norm(ankle - hip), 1e-9)
-        bends.append((knee - hip - (knee - hip) @ shin * shin) @ forward)
+        along = (ankle - hip) / max(np.linalg.norm(ankle - hip), 1e-9)
+        bends.append((knee - hip - (knee - hip) @ along * along) @ forward)
         if f"foot_{side}" in joints_m:
             feet.append((joints_m[f"foot_{side}"] - ankle) @ forward)
     for what, distances in (("the knees bend", bends), ("the feet point", feet)):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.tracking.capsules.jumper import CAPSULES, SKIN, SURFACE_CLASSES
 from airborne.tracking.capsules.surface_colours import SurfaceColours, occlusion_chance
@@ -46,7 +47,11 @@ def update_occlusion(track: Track, owned: Array, views: Sequence[int]) -> Array:
     return occlusion
 
 
+def shows_player(occlusion: Array) -> NDArray[np.bool_]:
+    """Return in which views (v,) neither the player nor the legs alone are occluded: occlusion (v, 5)."""
+    return np.maximum(occlusion.mean(axis=1), occlusion[:, SKIN:].mean(axis=1)) < _OCCLUDED
+
+
 def count_unoccluded(occlusion: Array, views: Sequence[int]) -> int:
-    """Count the views in which neither the player nor the legs alone are occluded."""
-    most = np.maximum(occlusion[views].mean(axis=1), occlusion[views, SKIN:].mean(axis=1))
-    return int(np.sum(most < _OCCLUDED))
+    """Count those of some views in which neither the player nor the legs alone are occluded."""
+    return int(np.sum(shows_player(occlusion)[list(views)]))
