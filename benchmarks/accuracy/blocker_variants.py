@@ -29,7 +29,7 @@ INSIDE_95 = 7.815  # squared distance that 95 % of a Gaussian in space lie withi
 Switch = tuple[ModuleType, str, Any]
 VARIANTS: dict[str, list[Switch]] = {
     "everything": [],
-    "without habits": [(fit, "_POSTURE_INFORMATION", np.zeros_like(fit._POSTURE_INFORMATION))],
+    "without habits": [(fit, "POSTURE_INFORMATION", np.zeros_like(fit.POSTURE_INFORMATION))],
     "without standing feet": [(tracker, "_CONTACT_M", -1.0)],
     "without flight": [(tracker, "_AIRBORNE_M", np.inf)],
     "without hidden views": [(occlusion, "_OCCLUSION_RATE", 0.0)],

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from rows import ROOT, append
 
-from airborne.body import BodyModel
+from airborne.body import BodyModel, Box
 from airborne.cameras import Camera, Rig
 from airborne.evaluation import read_truth
 from airborne.motion import Motion
@@ -74,6 +74,7 @@ def scaled(model: BodyModel, factor: float) -> BodyModel:
         parts = []
         for part in segment.parts:
             at = part.segment_from_part
+            assert isinstance(part.shape, Box)
             moved = RigidTransform.from_components(factor * at.translation, at.rotation)
             parts.append(
                 replace(part, shape=replace(part.shape, size_m=factor * part.shape.size_m), segment_from_part=moved)

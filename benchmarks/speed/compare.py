@@ -151,7 +151,7 @@ def yardstick() -> Callable[[], float] | None:
     if not (YARDSTICK / "score18.cpp").is_file():
         return None
     sys.path.insert(0, str(YARDSTICK))
-    import run
+    import run  # pyright: ignore[reportMissingImports]
 
     score, poses = run.Yardstick("sd"), run.hypotheses(100)
 

@@ -22,6 +22,7 @@ from rows import ROOT, append
 
 from airborne.body.files import read_body
 from airborne.evaluation import compare_joints, landmark_of, read_joint_paths
+from airborne.motion import Motion
 from airborne.run.detections import landmarks_over_time
 from airborne.run.opening import open_trial
 from airborne.run.own_body import fit_person
@@ -66,6 +67,7 @@ def main(data: Path, body: Path | None) -> None:
         seen = landmarks_over_time(opened.recording.rig, opened.detections)
         run = track_trial(trial, folder / "run", pictures=False)
         model = read_body(folder / "run" / "body.toml")
+    assert isinstance(run.motion, Motion)
     motion, base = run.motion, {"data": "balance, whole body", "method": trial.track.method, "n": len(run.motion)}
     trc = read_joint_paths(data / "Pose2Sim_markers.trc")
     paths = {landmark_of(name): trc.points[:, i] for i, name in enumerate(trc.names)}

@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rows import ROOT, append
 
 from airborne.geometry.triangulation import triangulate
+from airborne.motion import Motion
 from airborne.run.opening import open_cameras
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
@@ -77,6 +78,7 @@ def main(data: Path) -> None:
         start = rig.points_from_px(np.array(CLICKED_PX, float))
         path.write_text(trial_text(data, [round(float(x), 4) for x in start]))
         motion = track_trial(read_trial(path), Path(folder) / "run", pictures=False).motion
+    assert isinstance(motion, Motion)
     detections = np.load(data / "detections_2d.npz")
     px = np.stack([detections["c" + name[3:]][:, EARS, :2] for name in CAMERAS], axis=2)
     ears = triangulate(rig.P, px).mean(axis=1)
