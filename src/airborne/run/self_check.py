@@ -62,7 +62,8 @@ def check_run(
         status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):
             sentences.append(f"self-check: {count_of(len(doubtful), len(motion), 'frame')} uncertain: {reason}")
-    if not model.has_joints and (wrong := describe_wrong_rate(path.time_s, path.positions, path.rotations)):
+    covariance = path.covariance[:, :3, :3]
+    if not model.has_joints and (wrong := describe_wrong_rate(path.time_s, path.positions, path.rotations, covariance)):
         sentences.append(f"self-check: {wrong}")
     lasting = None if found is None else found.lasting_at(motion.index)
     checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)

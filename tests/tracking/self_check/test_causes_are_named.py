@@ -61,6 +61,27 @@ def checked(*, rig=RIG, model=CROSS, late_s=0.0):
     return self_check(run, model, rig, path)
 
 
+def checked_alone(factor):
+    """Check what one camera sees of a body whose file is larger by a factor: it is as much further away."""
+    camera = SCENE.cameras[0]
+    frames = [replace(each, views=each.views[:1]) for each in frames_seen()]
+    times = np.array([float(each.time_s) for each in frames])
+    poses, covariances = [], []
+    for each in frames:
+        true = SCENE.start(each.index).world_from_root
+        away = factor * (true.translation - camera.centre)
+        place = RigidTransform.from_components(camera.centre + away, true.rotation)
+        poses.append(Pose(world_from_root=place))
+        along = away / np.linalg.norm(away)
+        covariances.append(np.diag([1e-3] * 3 + [2e-3] * 3) ** 2)
+        covariances[-1][:3, :3] += 0.02**2 * np.outer(along, along)
+    path = TrackedPath(np.array([each.index for each in frames]), times, poses, np.array(covariances))
+    rig = Rig((camera,))
+    run = gather_equations(larger(factor), rig, path, frames, body_sd=0.01)
+    assert run is not None
+    return self_check(run, larger(factor), rig, path)
+
+
 def turned(degrees):
     turn = Rotation.from_rotvec([0, np.radians(degrees), 0])
     places = [RigidTransform.from_rotation(turn) * c.camera_from_world for c in SCENE.cameras]
@@ -126,3 +147,10 @@ def test_a_body_that_really_leaves_is_not_doubtful():
     path = TrackedPath(np.arange(24), np.arange(24) / FPS, poses, np.zeros((24, 6, 6)))
     frames = frames_seen()
     assert not any(each.any() for each in doubts(CROSS, path, frames, (poses[0], frames[0]), None).values())
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.0, 1.1])
+def test_of_one_camera_the_fall_tells_the_size_of_the_body(factor):
+    alarms = [finding for finding in checked_alone(factor).diagnosis.findings if finding.is_alarm]
+    assert [(each.subject, each.kind) for each in alarms] == ([] if factor == 1 else [("body", "scale")])
+    assert all(abs(each.value - (1 / factor - 1)) < 2 * each.sd for each in alarms)

@@ -75,18 +75,34 @@ def thrown(n, rate):
     return np.arange(n) / rate, centre + R @ np.array([0.1, 0.2, 0.0]), R
 
 
+def known(n):
+    """Covariances of positions that are known to a millimetre."""
+    return np.tile(1e-6 * np.eye(3), (n, 1, 1))
+
+
 def test_a_fall_is_measured_whatever_point_of_the_body_is_tracked():
-    found = fall(*thrown(12, 25))
+    found = fall(*thrown(12, 25), known(12))
     assert found is not None
     np.testing.assert_allclose(found[1], -9.81, atol=1e-6)
 
 
+def test_a_fall_is_measured_across_a_direction_that_one_camera_hardly_sees():
+    time_s, position, R = thrown(25, 25)
+    depth = np.array([0.6, 0.8, 0.0])
+    blurred = position + np.random.default_rng(3).normal(0, 0.03, (25, 1)) * depth
+    covariance = known(25) + 0.03**2 * np.outer(depth, depth)
+    assert fall(time_s, blurred, R, known(25)) is None  # by its residuals no parabola
+    found = fall(time_s, blurred, R, covariance)
+    assert found is not None
+    assert abs(found[1] + 9.81) < 2 * found[2] < 0.5
+
+
 @pytest.mark.parametrize(("rate", "said"), [(25, None), (22, None), (12.5, "2.5 m/s²"), (50, "39.2 m/s²"), (3, None)])
 def test_a_fall_that_no_size_explains_tells_of_a_wrong_rate(rate, said):
-    found = describe_wrong_rate(*thrown(40, rate))
+    found = describe_wrong_rate(*thrown(40, rate), known(40))
     assert (found is None) if said is None else (said in found and f"{rate / 25:.2f} of that" in found)
 
 
 def test_a_body_at_rest_does_not_fall():
-    assert describe_wrong_rate(np.arange(40) / 25, np.zeros((40, 3)), np.tile(np.eye(3), (40, 1, 1))) is None
-    assert fall(np.arange(12) / 25, np.zeros((12, 3)), np.tile(np.eye(3), (12, 1, 1))) is None
+    assert describe_wrong_rate(np.arange(40) / 25, np.zeros((40, 3)), np.tile(np.eye(3), (40, 1, 1)), known(40)) is None
+    assert fall(np.arange(12) / 25, np.zeros((12, 3)), np.tile(np.eye(3), (12, 1, 1)), known(12)) is None

@@ -85,7 +85,9 @@ def self_check(run: RunEquations, model: BodyModel, rig: Rig, path: TrackedPath)
     rows, evidence, errors = run.rows, run.evidence, run.errors
     diagnosis = Diagnosis((), np.zeros(len(run.prior)), run.prior)
     if run.says_causes:
-        diagnosis = name_causes(run.solution, nuisances_of(rig), run.prior)
+        # one camera's place and clock are those of the poses
+        causes = [each for each in nuisances_of(rig) if len(rig) > 1 or each.kind in ("scale", "focal")]
+        diagnosis = name_causes(run.solution, causes, run.prior)
     constant = _constant_errors(errors, diagnosis, len(run.prior))
     if model.has_joints:  # the covariances of its frames hold that its shape is wrong
         added = _constant_errors(errors, diagnosis, first_bias(rig))
@@ -166,7 +168,7 @@ def gather_equations(
         wide = widen(wide, nuisance)
     solution, weights = solve(evidence, wide)
     errors = pose_errors(evidence, weights)
-    return RunEquations(rows, evidence, _with_fall(solution, errors, path, rows), errors, prior)
+    return RunEquations(rows, evidence, _with_fall(solution, errors, rig, path, rows), errors, prior)
 
 
 def _gather(
@@ -221,13 +223,23 @@ def _register(silhouette: Silhouette, rgb: Image, scene: Image, *, in_light: boo
 
 
 def _with_fall(
-    solution: NuisanceSolution, errors: PoseErrors, path: TrackedPath, rows: Sequence[int]
+    solution: NuisanceSolution, errors: PoseErrors, rig: Rig, path: TrackedPath, rows: Sequence[int]
 ) -> NuisanceSolution:
-    """Add what the fall says of the sizes, where the body falls freely."""
-    at = list(rows)
-    found = fall(path.time_s[at], path.positions[at] + errors.seen[:, :3], path.rotations[at])
+    """Add what the fall says of the sizes, where the body falls freely.
+
+    Silhouettes correct its path where cameras contradict each other. One camera's poses agree with it whatever is
+    wrong, and so lie where that takes them.
+    """
+    if len(rig) == 1:
+        found = fall(path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3])
+        by_parameter = -np.stack([twists(rig, 0, position, np.zeros(6)) for position in path.positions])
+    else:
+        at = list(rows)
+        position = path.positions[at] + errors.seen[:, :3]
+        found = fall(path.time_s[at], position, path.rotations[at], errors.noise[:, :3, :3])
+        by_parameter = errors.seen_by_parameter
     if found is None:
         return solution
     by_position, acceleration, sd = found
-    row = by_position @ errors.seen_by_parameter[:, :3].reshape(len(by_position), -1)
+    row = by_position @ by_parameter[:, :3].reshape(len(by_position), -1)
     return solution.with_row(row, -excess(acceleration), sd)

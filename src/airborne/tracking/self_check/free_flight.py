@@ -9,6 +9,7 @@ from airborne.types import Array
 
 _LEAST_MOMENTS, _LEAST_S = 7, 0.25  # of a flight that is measured
 _MOST_RMS_M = 0.008  # about the parabola: more is no free flight, or not of the centre of mass
+_LEAST_NOISE_M = 0.001  # chosen on three synthetic throws seen by one camera: noise beside the stated deviation
 _MOST_TILT = 0.15  # horizontal acceleration, as a share of the vertical one
 _LEAST_M_S2, _MOST_M_S2 = 6.0, 15.0  # a fall that a wrong scale can explain
 # chosen: a fall that a wrong frame rate explains, half and twice the right one, and its least length, as hands
@@ -17,27 +18,28 @@ _SLOWEST_M_S2, _FASTEST_M_S2, _LONG_S = 2.0, 45.0, 0.5
 _LEAST_SD_M_S2 = 0.03  # air, and a centre of mass that is not quite where it is taken to be
 
 
-def fall(time_s: Array, position: Array, R: Array) -> tuple[Array, float, float] | None:
+def fall(time_s: Array, position: Array, R: Array, covariance: Array) -> tuple[Array, float, float] | None:
     """Measure the vertical acceleration of a body that turns freely; None where it is not in free flight.
 
-    time_s (n,), root's position (n, 3) [m], R (n, 3, 3) world from root. The centre of mass is fixed in the root, in an
-    unknown place. Returns the weights (3 n,) of the positions in the acceleration, it itself and its sd [m/s2].
+    time_s (n,), root's position (n, 3) [m], R (n, 3, 3) world from root, covariance (n, 3, 3) of the positions [m2], as
+    one camera hardly sees how far away a body is. The centre of mass is fixed in the root, in an unknown place. Returns
+    the weights (3 n,) of the positions in the acceleration, it itself and its sd [m/s2].
     """
-    found = _parabola(time_s, position, R)
+    found = _parabola(time_s, position, R, covariance)
     if found is None:
         return None
-    weights, acceleration, rms = found
+    weights, acceleration, sd = found
     if not _LEAST_M_S2 < -acceleration < _MOST_M_S2:
         return None
-    return weights, acceleration, float(np.hypot(_LEAST_SD_M_S2, 2 * rms * np.linalg.norm(weights)))
+    return weights, acceleration, float(np.hypot(_LEAST_SD_M_S2, 2 * sd))
 
 
-def describe_wrong_rate(time_s: Array, position: Array, R: Array) -> str | None:
+def describe_wrong_rate(time_s: Array, position: Array, R: Array, covariance: Array) -> str | None:
     """Say that a body falls so slowly or fast that no wrong size explains it; None where it does not, or briefly.
 
     The arrays are those of `fall`.
     """
-    found = _parabola(time_s, position, R) if len(time_s) and np.ptp(time_s) >= _LONG_S else None
+    found = _parabola(time_s, position, R, covariance) if len(time_s) and np.ptp(time_s) >= _LONG_S else None
     if found is None or not _SLOWEST_M_S2 < -found[1] < _FASTEST_M_S2 or _LEAST_M_S2 < -found[1] < _MOST_M_S2:
         return None
     share = float(np.sqrt(-found[1] / GRAVITY_M_S2))
@@ -47,21 +49,26 @@ def describe_wrong_rate(time_s: Array, position: Array, R: Array) -> str | None:
     )
 
 
-def _parabola(time_s: Array, position: Array, R: Array) -> tuple[Array, float, float] | None:
-    """Return the weights of the positions in the vertical acceleration, it itself and the RMS residual; as `fall`."""
+def _parabola(time_s: Array, position: Array, R: Array, covariance: Array) -> tuple[Array, float, float] | None:
+    """Return the weights of the positions in the vertical acceleration, it itself and its sd by residuals; as `fall`.
+
+    The residual that tells free flight weighs directions as the fit does; where all have equal noise it is the RMS.
+    """
     n, t = len(time_s), time_s - np.mean(time_s)
     if n < _LEAST_MOMENTS or np.ptp(time_s) < _LEAST_S:
         return None
     one = np.eye(3)
     rows = np.stack([np.hstack([one, one * s, one * s**2 / 2, -each]) for s, each in zip(t, R, strict=True)])
-    design = rows.reshape(3 * n, 12)
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance + _LEAST_NOISE_M**2 * one))  # (n, 3, 3)
+    design, whitened = (whiten @ rows).reshape(3 * n, 12), (whiten @ position[..., None]).ravel()
     inverse = np.linalg.pinv(design, rcond=1e-4)
-    solution = inverse @ position.ravel()
-    residual = position.ravel() - design @ solution
-    rms = float(np.sqrt(residual @ residual / max(3 * n - 12, 1)))
-    g = solution[6:9]
+    solution = inverse @ whitened
+    residual = whitened - design @ solution
+    noise = float(np.sqrt(residual @ residual / max(3 * n - 12, 1)))  # in units of the covariances
+    g, rms = solution[6:9], noise * np.sqrt(3 * n / np.sum(whiten**2))
     is_parabola = -g[2] > 0 and np.hypot(g[0], g[1]) < _MOST_TILT * -g[2] and rms < _MOST_RMS_M
-    return (inverse[8], float(g[2]), rms) if is_parabola else None
+    weights = (inverse[8].reshape(n, 1, 3) @ whiten).ravel()
+    return (weights, float(g[2]), noise * float(np.linalg.norm(inverse[8]))) if is_parabola else None
 
 
 def excess(acceleration: float) -> float:
