@@ -14,13 +14,17 @@ from airborne.errors import count_of
 from airborne.motion import Motion
 from airborne.tracking import Doubt, Status
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
-from airborne.tracking.self_check.free_flight import describe_wrong_rate
+from airborne.tracking.self_check.free_flight import describe_wrong_rate, fall
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.self_check.nuisances import MEASURED_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
 
 # of the sizes of body and world, chosen: at a rate 10 % too low those of a throw were 23.2 and 23.4 %
 _ALIKE = 0.1
+_UNKNOWN_SIZE = (
+    "self-check: to one camera only a free fall shows how large a body is, and none was measured: "
+    "distances are as right as the sizes in the body's file"
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,9 +66,12 @@ def check_run(
         status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):
             sentences.append(f"self-check: {count_of(len(doubtful), len(motion), 'frame')} uncertain: {reason}")
-    covariance = path.covariance[:, :3, :3]
-    if not model.has_joints and (wrong := describe_wrong_rate(path.time_s, path.positions, path.rotations, covariance)):
-        sentences.append(f"self-check: {wrong}")
+    if not model.has_joints:
+        flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
+        if wrong := describe_wrong_rate(*flight):
+            sentences.append(f"self-check: {wrong}")
+        elif len(rig) == 1 and found is not None and fall(*flight) is None:
+            sentences.append(_UNKNOWN_SIZE)
     lasting = None if found is None else found.lasting_at(motion.index)
     checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)
     return CheckedRun(checked, found, tuple(sentences))
