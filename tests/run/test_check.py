@@ -14,6 +14,7 @@ from airborne.errors import MistakesError, ResultError
 from airborne.run.check import check_trial
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
+from airborne.video import inspect
 from tests.support.places import ROOT
 from tests.support.players_trial import write_trial
 from tests.support.run_files import files_of
@@ -255,3 +256,28 @@ def test_only_a_folder_that_holds_a_run_is_overwritten(folder, tmp_path):
     with pytest.raises(ResultError):
         track_trial(read_trial(folder / "trial.toml"), tmp_path / "mine", overwrite=True)
     assert (tmp_path / "mine" / "motion.csv").read_text() == "mine"
+
+
+def test_a_video_shorter_than_the_first_is_noted_unless_the_cameras_are_synchronised(folder, monkeypatch):
+    def shorter(source):
+        facts = inspect(source)
+        return replace(facts, duration_s=facts.duration_s / 2) if source.path.name == "cam2.mp4" else facts
+
+    monkeypatch.setattr("airborne.run.check.inspect", shorter)
+    noted = [line for line in check_trial(folder / "trial.toml").well if "`airborne sync` finds" in line]
+    assert len(noted) == 1
+    assert noted[0].startswith("note: the video of cam2 is 0.34 s shorter than that of cam1")
+    path = edit(folder, ('video = "cam2.mp4"', 'video = "cam2.mp4"\noffset_s = 0.001'))
+    assert not any("`airborne sync` finds" in line for line in check_trial(path).well)
+
+
+def test_what_casts_doubt_on_the_calibration_is_noted_before_tracking(folder):
+    table = folder / "control_points.csv"
+    head, *rows = table.read_text(encoding="utf-8").splitlines()
+    stretched = []
+    for row in rows:
+        name, x, y, z, *px = row.split(",")
+        stretched.append(",".join([name, x, y, f"{1.15 * float(z):.4f}", *px]))
+    table.write_text("\n".join([head, *stretched]) + "\n", encoding="utf-8")
+    path = edit(folder, ('file = "calib_true.toml"', 'control_points = "control_points.csv"'))
+    assert any(line.startswith("note: camera 'cam") for line in check_trial(path).well)

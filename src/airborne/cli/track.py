@@ -19,6 +19,8 @@ from airborne.io.terminal import Stages
 if TYPE_CHECKING:
     from airborne.run.track import TrackResult
 
+_CLEAR_SDS = 3.0  # from zero, as of an alarm of the self-check, which asks for evidence beside it
+_NORMS = ("turn_deg", "shift_m")  # kinds of three numbers, whose norm is never near zero
 _FIRST_WRITTEN = ("motion.csv", "joints.csv")  # of a body, of players
 
 
@@ -162,8 +164,11 @@ def _describe_self_check(summary: dict) -> str | None:
         return "self-check: something is wrong, see the notes"
     if not summary["n_tracked"]:
         return "self-check: no frame is tracked, so it says nothing of body, cameras and times"
-    sizes = "; ".join(each["sentence"] for each in findings[:2])
-    return f"self-check of sizes, cameras and times: nothing seems wrong; {sizes}"
+    numbers = [each for each in findings if each["kind"] not in _NORMS]
+    clear = [each for each in numbers if abs(each["value"]) > _CLEAR_SDS * each["sd"]]
+    said = "; ".join(each["sentence"] for each in clear or findings[:2])
+    verdict = "nothing is surely wrong, but" if clear else "nothing seems wrong;"
+    return f"self-check of sizes, cameras and times: {verdict} {said}"
 
 
 def _overlays(output: Path) -> list[Path]:

@@ -22,6 +22,7 @@ from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
 
 _T = TypeVar("_T")
+_UNEQUAL = 0.05  # chosen: of the first camera's duration; cameras stopped one after the other differ by less
 _NO_MIX_UP = "videos: no sign that cameras' videos were exchanged"
 
 
@@ -66,6 +67,7 @@ def check_trial(path: Path, report: Callable[[str], None] = lambda line: None) -
     checks.mistakes += [f"{path.name}: {mistake}" for mistake in list_wrong_names(trial)]
     facts = _check_videos(checks, trial)
     checks.attempt(lambda: refuse_same_files(trial), lambda _: "videos: each camera has a file of its own")
+    _note_lengths(checks, trial, facts)
     _check_files(checks, trial, facts)
     if not checks.mistakes:
         _check_start(checks, trial, tuple(facts.values()))
@@ -97,15 +99,30 @@ def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
     return found
 
 
+def _note_lengths(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> None:
+    """Note a video that is shorter than the first camera's, where nobody has said that cameras began apart."""
+    first, durations = trial.camera[0].name, {name: each.duration_s for name, each in facts.items()}
+    if any(camera.offset_s for camera in trial.camera) or (longest := durations.get(first)) is None:
+        return
+    for name, duration_s in durations.items():
+        if duration_s is not None and longest - duration_s > _UNEQUAL * longest:
+            checks.add(
+                f"note: the video of {name} is {float(longest - duration_s):.2f} s shorter than that of {first}: if it "
+                "began later, `airborne sync` finds by how much"
+            )
+
+
 def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> None:
     """Read the calibration, the body and the detections; those that do not exist are listed already."""
     calibration, body, detections = trial.calibration, trial.body, trial.start.detections
     shown = trial.model_copy(update={"camera": [camera for camera in trial.camera if camera.name in facts]})
     if facts and _exists(trial, calibration.file or calibration.control_points):
         sizes = {name: each.size for name, each in facts.items()}
-        checks.attempt(
+        cameras = checks.attempt(
             lambda: read_or_calibrate(shown, sizes), lambda cameras: f"calibration: {', '.join(cameras[0].names)}"
         )
+        for warning in cameras[1].warnings if cameras is not None and cameras[1] is not None else ():
+            checks.add(f"note: {warning}")
     if not trial.has_players and _exists(trial, body.source_file):
         checks.attempt(
             trial.model,

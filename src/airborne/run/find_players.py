@@ -70,7 +70,7 @@ def find_players_start(
     frame, starts = _track_back(trial, recording, finding)
     stand = "stands" if len(starts) == 1 else "stand"
     note = (
-        f"[[start.player]] were found: {count(len(starts), 'player')} {stand} out best in frame {finding.frames.index} "
+        f"[[start.player]]: {count(len(starts), 'player')} found, who {stand} out best in frame {finding.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     return FoundPlayers(_with_start(trial, frame, starts), finding, facts, note)

@@ -58,7 +58,7 @@ def test_nobody_is_found_beside_a_player_who_is_nowhere_or_right_below_a_camera(
 def test_only_the_player_is_estimated(estimates):
     assert {each.player for each in estimates} == {"anna"}
     assert [each.note for each in estimates if each.note] == [
-        "2 bystanders the start does not name, followed as they may hide players"
+        "2 bystanders followed whom the start does not name: they may hide players"
     ]
 
 

@@ -144,7 +144,7 @@ class Blocker:
                 estimate if estimate.score > _LEAST_EVIDENCE else lost_player_estimate(start.name, frames, len(JOINTS))
             )
         if found:
-            note = f"{count(len(found), 'bystander')} the start does not name, followed as they may hide players"
+            note = f"{count(len(found), 'bystander')} followed whom the start does not name: they may hide players"
             estimates[0] = replace(estimates[0], note=note)
         bystanders = tuple(_first_track(each, frames) for each in found)
         return Everybody(tracks, bystanders, frames.time_s), tuple(estimates)

@@ -1,0 +1,21 @@
+"""What the self-check is surer of than three deviations is said, even where it is too little for an alarm."""
+
+import re
+import shutil
+
+from tests.support.commands import in_process
+
+
+def test_a_body_that_is_a_little_too_large_is_not_called_right(thrown_cross, tmp_path, capsys):
+    shutil.copytree(thrown_cross, tmp_path / "trial")
+    body = tmp_path / "trial" / "cross.toml"
+
+    def larger(match):
+        numbers = ", ".join(f"{1.03 * float(x):.5f}" for x in match[2].split(","))
+        return f"{match[1]} = [{numbers}]"
+
+    text = re.sub(r"(size_m|centre_m) = \[([^\]]*)\]", larger, body.read_text(encoding="utf-8"))
+    body.write_text(text, encoding="utf-8")
+    assert in_process("track", tmp_path / "trial" / "trial.toml", "-o", tmp_path / "run", "--no-pictures") == 0
+    said = capsys.readouterr().out
+    assert re.search(r"nothing is surely wrong, but the body looks 3\.\d ± 0\.\d % smaller than its file says", said)
