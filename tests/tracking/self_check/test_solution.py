@@ -95,6 +95,12 @@ def test_a_fall_is_measured_across_a_direction_that_one_camera_hardly_sees():
     found = fall(time_s, blurred, R, covariance)
     assert found is not None
     assert abs(found[1] + 9.81) < 2 * found[2] < 0.5
+    blurred[3] += 5  # where nothing is known, a position counts for nothing
+    covariance[3] = np.inf
+    found = fall(time_s, blurred, R, covariance)
+    assert found is not None
+    assert abs(found[1] + 9.81) < 2 * found[2] < 0.5
+    assert fall(time_s, blurred, R, np.full((25, 3, 3), np.nan)) is None
 
 
 @pytest.mark.parametrize(("rate", "said"), [(25, None), (22, None), (12.5, "2.5 m/s²"), (50, "39.2 m/s²"), (3, None)])

@@ -55,11 +55,13 @@ def _parabola(time_s: Array, position: Array, R: Array, covariance: Array) -> tu
     The residual that tells free flight weighs directions as the fit does; where all have equal noise it is the RMS.
     """
     n, t = len(time_s), time_s - np.mean(time_s)
-    if n < _LEAST_MOMENTS or np.ptp(time_s) < _LEAST_S:
+    is_known = np.asarray(np.isfinite(covariance).all(axis=(1, 2)))
+    if np.count_nonzero(is_known) < _LEAST_MOMENTS or np.ptp(time_s) < _LEAST_S:
         return None
     one = np.eye(3)
     rows = np.stack([np.hstack([one, one * s, one * s**2 / 2, -each]) for s, each in zip(t, R, strict=True)])
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance + _LEAST_NOISE_M**2 * one))  # (n, 3, 3)
+    finite = np.where(is_known[:, None, None], covariance, one) + _LEAST_NOISE_M**2 * one
+    whiten = is_known[:, None, None] * np.linalg.inv(np.linalg.cholesky(finite))  # (n, 3, 3); 0: counts for nothing
     design, whitened = (whiten @ rows).reshape(3 * n, 12), (whiten @ position[..., None]).ravel()
     inverse = np.linalg.pinv(design, rcond=1e-4)
     solution = inverse @ whitened
