@@ -19,7 +19,7 @@ from airborne.io.terminal import Stages
 if TYPE_CHECKING:
     from airborne.run.track import TrackResult
 
-_CLEAR_SDS = 3.0  # from zero, as of an alarm of the self-check, which asks for evidence beside it
+_CLEAR_SDS = 3.0  # chosen: from zero, as of an alarm of the self-check, which asks for evidence beside it
 _NORMS = ("turn_deg", "shift_m")  # kinds of three numbers, whose norm is never near zero
 _FIRST_WRITTEN = ("motion.csv", "joints.csv")  # of a body, of players
 

@@ -102,12 +102,12 @@ def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
 def _note_lengths(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> None:
     """Note a video that is shorter than the first camera's, where nobody has said that cameras began apart."""
     first, durations = trial.camera[0].name, {name: each.duration_s for name, each in facts.items()}
-    if any(camera.offset_s for camera in trial.camera) or (longest := durations.get(first)) is None:
+    if any(camera.offset_s for camera in trial.camera) or (first_s := durations.get(first)) is None:
         return
     for name, duration_s in durations.items():
-        if duration_s is not None and longest - duration_s > _UNEQUAL * longest:
+        if duration_s is not None and first_s - duration_s > _UNEQUAL * first_s:
             checks.add(
-                f"note: the video of {name} is {float(longest - duration_s):.2f} s shorter than that of {first}: if it "
+                f"note: the video of {name} is {float(first_s - duration_s):.2f} s shorter than that of {first}: if it "
                 "began later, `airborne sync` finds by how much"
             )
 

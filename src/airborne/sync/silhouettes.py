@@ -28,7 +28,7 @@ from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, decod
 OnImage = Callable[[], None]
 
 _WIDTH_PX = 320  # of the images compared [px]
-MOST_IMAGES = 1500  # images read
+MOST_IMAGES = 1500  # chosen: images read
 _N_BACKGROUND = 60  # images that the median is made of
 _LEAST_SDS = 5.0  # robust sds of the static scene
 _LEAST_GREY = 8.0  # grey levels by which something must differ in any case
