@@ -47,3 +47,11 @@ def test_where_little_can_be_seen_nothing_is_said():
     everywhere = RNG.random(still.shape) < 0.9
     assert kinds([everywhere, everywhere, everywhere]) == []
     assert kinds([disc(80, 60), disc(80, 60), disc(80, 60)], [disc(79.5, 60), disc(84, 60), disc(74, 60)]) == []
+
+
+def test_a_start_in_a_wrong_place_is_no_mix_up():
+    """One camera agrees once its images are mirrored, by chance; the others agree with nothing, either way."""
+    misplaced = [disc(80, 100), disc(20, 20), disc(160 - 1 - 60, 95)]
+    assert kinds(IMAGES, misplaced) == []
+    two_right = [SILHOUETTES[0], SILHOUETTES[1], disc(160 - 1 - 60, 95)]
+    assert kinds(IMAGES, two_right) == [("mirrored", (NAMES[2],))]

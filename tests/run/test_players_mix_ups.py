@@ -76,7 +76,7 @@ def test_where_nobody_stands_nothing_is_said(start):
 
 def test_exchanged_files_are_refused_by_check_and_track(tmp_path):
     path = HALL.write_trial(tmp_path, 3, videos=(NAMES[1], NAMES[0], NAMES[2]))
-    said = f"the videos of {NAMES[0]} and {NAMES[1]} are exchanged; exchange them back"
+    said = f"the videos of {NAMES[0]} and {NAMES[1]}, or their calibrations, are exchanged; exchange them back"
     (mistake,) = check_trial(path).mistakes
     assert mistake.startswith(
         f"the videos: with the images of {NAMES[0]} and {NAMES[1]} exchanged, the players at the start fit"
