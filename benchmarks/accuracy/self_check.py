@@ -110,8 +110,7 @@ def track(trial: Trial, case: Case) -> CheckedRun:
         state, estimate = step(tracker, state, frames)
         estimates.append(estimate)
         kept.add(frames)
-    args = Motion.collect(estimates), model, recording.rig, trial.start.pose, kept
-    return check_run(*args, is_preset=False)
+    return check_run(Motion.collect(estimates), model, recording.rig, kept, is_preset=False)
 
 
 def errors_in_sds(motion: Motion, truth: Path) -> dict[str, np.ndarray]:

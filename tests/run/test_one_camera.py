@@ -26,5 +26,5 @@ def test_where_nothing_falls_the_size_is_said_to_be_the_files(motion, is_said):
     for index in indices:
         kept.add(scene.frames(index))
     run = Motion.collect(track(scene, indices))
-    found = check_run(run, CROSS, Rig(scene.cameras), scene.start(), kept, is_preset=False)
+    found = check_run(run, CROSS, Rig(scene.cameras), kept, is_preset=False)
     assert any("only a free fall shows" in doubt for doubt in found.doubts) == is_said

@@ -231,7 +231,7 @@ class BodyRun:
         sort_rows(folder / self.table)
         motion, model, begun_s = read_motion(folder / self.table), self.model, time.monotonic()
         is_preset = self.trial.body.file is None
-        checked = check_run(motion, model, self.recording.rig, self.start, self.kept, is_preset=is_preset)
+        checked = check_run(motion, model, self.recording.rig, self.kept, is_preset=is_preset)
         fitted, timings_s = None, {"self_check": time.monotonic() - begun_s}
         if self._fits_whole_run:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))

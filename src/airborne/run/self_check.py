@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from airborne.body import BodyModel, Pose
+from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.errors import count_of
 from airborne.motion import Motion
@@ -45,12 +45,11 @@ def check_run(
     motion: Motion,
     model: BodyModel,
     rig: Rig,
-    start: Pose,
     kept: KeptFrames,
     *,
     is_preset: bool,
 ) -> CheckedRun:
-    """Check a finished run by some of its frames, and its first pose."""
+    """Check a finished run by some of its frames, in the order in which they were tracked."""
     rows, first = np.flatnonzero(motion.has_pose), next(iter(kept), None)
     if not len(rows) or first is None:
         return CheckedRun(motion, None, ())
@@ -61,7 +60,7 @@ def check_run(
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
     status, doubted, sentences = motion.status.astype(object), motion.doubts.astype(object), []
-    for reason, is_doubtful in doubts(model, path, frames, (start, first), found).items():
+    for reason, is_doubtful in doubts(model, path, frames, first.index, found).items():
         doubtful = rows[is_doubtful & (motion.status[rows] == Status.TRACKED.value)]
         status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):

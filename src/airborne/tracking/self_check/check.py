@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel, Pose
+from airborne.body import BodyModel
 from airborne.cameras import Rig
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.absolute import has_stayed, lies_elsewhere, spread, too_fast, zigzags
@@ -38,7 +38,10 @@ _MOST_MOMENTS = 16  # at which silhouettes are registered
 _N_THREADS = min(os.cpu_count() or 1, 4)  # register silhouettes; OpenCV lets go of Python's lock, half of the time
 _FEWEST_MOMENTS = 3  # with fewer, nothing is said of causes
 
-STAYED = "what the body covered at its start, and does not cover any more, looks as it did then"
+STAYED = (
+    "what the body covered at its start, and does not cover any more, looks as it did then: that may not have been the "
+    "body, so look at where it starts"
+)
 ELSEWHERE = "what stands out from the empty scene lies beside the body by more than its interval"
 FAST = "the body moves faster than bodies do"
 ZIGZAG = "the body goes forth and back between them, as where `fields` under [[camera]] has the wrong order"
@@ -110,15 +113,19 @@ def _constant_errors(errors: PoseErrors, diagnosis: Diagnosis, n: int) -> Array:
 
 
 def doubts(
-    model: BodyModel, path: TrackedPath, kept: Sequence[Frames], start: tuple[Pose, Frames], found: SelfCheck | None
+    model: BodyModel, path: TrackedPath, kept: Sequence[Frames], began: int, found: SelfCheck | None
 ) -> dict[str, NDArray[np.bool_]]:
     """Return which frames of a path are in doubt (n,), by what speaks against them; reasons without a frame too.
 
-    `kept` are in the order of time, `start` is the first pose and its frames.
+    `kept` are in the order of time; `began` is the frame that was tracked first. What the body covered at its start is
+    told by the first tracked pose, not by the given one, which may be off by as much as the tracker mends.
     """
     render_model, rows = RenderModel.of(model), [path.row(frames.index) for frames in kept]
     pairs = [(row, frames) for row, frames in zip(rows, kept, strict=True) if row is not None]
-    stayed = [has_stayed(render_model, start[0], path.poses[row], start[1], frames) for row, frames in pairs]
+    stayed: list[bool] = []
+    if pairs:
+        row, first = min(pairs, key=lambda pair: abs(pair[1].index - began))
+        stayed = [has_stayed(render_model, path.poses[row], path.poses[now], first, frames) for now, frames in pairs]
     at = path.index[[row for row, _ in pairs]]
     none = np.zeros(len(path.index), bool)
     return {
