@@ -24,7 +24,7 @@ from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
-from airborne.motion.flight.momentum_table import flight_warnings
+from airborne.motion.flight.momentum_table import wrong_flight
 from airborne.motion.joints import doubtful_segments
 from airborne.motion.run_folder import BODY, MOTION, TRACKED_MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
@@ -243,7 +243,8 @@ class BodyRun:
         measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
-        doubts = *flight_warnings(motion, measured.flight), *far_keys(self.trial, model, motion, self.recording.rig)
+        flight = wrong_flight(motion, measured.flight)
+        doubts = far_keys(self.trial, model, motion, self.recording.rig)
         self.recording.events.extend([*checked.doubts, *doubts])
         if not motion.count(Status.TRACKED) and len(motion) > 1:
             args = self.trial.settings, model, self.start, self.recording, progress_of("trying videos exchanged")
@@ -255,7 +256,7 @@ class BodyRun:
             **({} if measured.joint_statuses is None else {"joint_statuses": measured.joint_statuses}),
             **({} if measured.flight is None else {"flight": flight_summary(motion, measured.flight).to_dict()}),
             **({} if fitted is None else {"whole_run": fitted.surface}),
-            "self_check": checked.findings,
+            "self_check": [*([] if flight is None else [flight.to_dict()]), *checked.findings],
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
             "timings_s": timings_s,
         }

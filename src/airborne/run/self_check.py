@@ -14,7 +14,7 @@ from airborne.errors import count_of
 from airborne.motion import Motion
 from airborne.tracking import Doubt, Status
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
-from airborne.tracking.self_check.free_flight import describe_wrong_rate, fall
+from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong_rate
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.self_check.nuisances import MEASURED_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
@@ -34,11 +34,13 @@ class CheckedRun:
     motion: Motion  # with lasting errors, doubtful frames uncertain
     found: SelfCheck | None  # None: too little to say anything
     doubts: tuple[str, ...]  # sentences
+    fall: WrongFall | None = None  # of a body whose size does not explain it
 
     @property
     def findings(self) -> list[dict[str, Any]]:
         """What summary.json holds."""
-        return [] if self.found is None else [finding.to_dict() for finding in self.found.diagnosis.findings]
+        causes = () if self.found is None else self.found.diagnosis.findings
+        return [finding.to_dict() for finding in (self.fall, *causes) if finding is not None]
 
 
 def check_run(
@@ -65,15 +67,15 @@ def check_run(
         status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):
             sentences.append(f"self-check: {count_of(len(doubtful), len(motion), 'frame')} uncertain: {reason}")
+    wrong = None
     if not model.has_joints:
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
-        if wrong := describe_wrong_rate(*flight):
-            sentences.append(f"self-check: {wrong}")
-        elif len(rig) == 1 and found is not None and fall(*flight) is None:
+        wrong = find_wrong_rate(*flight)
+        if wrong is None and len(rig) == 1 and found is not None and fall(*flight) is None:
             sentences.append(_UNKNOWN_SIZE)
     lasting = None if found is None else found.lasting_at(motion.index)
     checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)
-    return CheckedRun(checked, found, tuple(sentences))
+    return CheckedRun(checked, found, tuple(sentences), wrong)
 
 
 def alarms(findings: Sequence[Mapping[str, Any]]) -> list[str]:

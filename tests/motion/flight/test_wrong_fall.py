@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airborne.constants import GRAVITY_M_S2
-from airborne.motion.flight.fall import describe_wrong_fall
+from airborne.motion.flight.fall import find_wrong_fall
 
 SD_M = 0.004  # of each place of the centre of mass
 
@@ -29,7 +29,7 @@ def flight(duration_s, *, scale=1.0, rate=60.0, stands_s=0.0, seed=0):
 @pytest.mark.parametrize("stands_s", [0.0, 0.6])
 def test_a_fall_in_the_right_world_says_nothing(duration_s, stands_s):
     for seed in range(20):
-        assert describe_wrong_fall(*flight(duration_s, stands_s=stands_s, seed=seed)) is None
+        assert find_wrong_fall(*flight(duration_s, stands_s=stands_s, seed=seed)) is None
 
 
 @pytest.mark.parametrize(
@@ -41,12 +41,14 @@ def test_a_fall_in_the_right_world_says_nothing(duration_s, stands_s):
 )
 @pytest.mark.parametrize("stands_s", [0.0, 0.6])
 def test_a_world_of_wrong_size_is_said(scale, lengths, rate, stands_s):
-    said = describe_wrong_fall(*flight(1.2, scale=scale, stands_s=stands_s))
-    assert said is not None and lengths in said and rate in said
+    found = find_wrong_fall(*flight(1.2, scale=scale, stands_s=stands_s))
+    assert found is not None and lengths in found.sentence and rate in found.sentence
+    finding = found.to_dict()
+    assert abs(finding["value"] - (scale - 1) * GRAVITY_M_S2) < 3 * finding["sd"] < 1
 
 
 def test_who_stands_or_jumps_for_too_short_says_nothing():
     t, path, R, variance = flight(0.3, scale=1.3, stands_s=0.5)
-    assert describe_wrong_fall(t, path, R, variance) is None
+    assert find_wrong_fall(t, path, R, variance) is None
     still = np.tile([0.0, 0, 1], (60, 1))
-    assert describe_wrong_fall(np.arange(60) / 60, still, np.tile(np.eye(3), (60, 1, 1)), np.full(60, SD_M**2)) is None
+    assert find_wrong_fall(np.arange(60) / 60, still, np.tile(np.eye(3), (60, 1, 1)), np.full(60, SD_M**2)) is None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from airborne.constants import GRAVITY_M_S2
 from airborne.motion.free_fall import GENERIC_NOISE, noise_covariance
+from airborne.tracking.self_check.free_flight import WrongFall
 from airborne.types import Array
 
 _WINDOW_S = 0.16  # of the parabolas that measure the acceleration
@@ -65,8 +66,8 @@ def fit_fall(time_s: Array, path: Array, R: Array) -> Fall:
     return Fall(solution[7:], noise**2 * inverse[7:, 7:], float(solution[6]), float(gravity_sd))
 
 
-def describe_wrong_fall(time_s: Array, path: Array, R: Array, variance: Array) -> str | None:
-    """Say what a flight's gravity tells of wrong lengths or a wrong frame rate; None where it is 9.81 m/s2.
+def find_wrong_fall(time_s: Array, path: Array, R: Array, variance: Array) -> WrongFall | None:
+    """Find what a flight's gravity tells of wrong lengths or a wrong frame rate; None where it is 9.81 m/s2.
 
     path (n, 3) [m] of the centre of mass, R (n, 3, 3) world from root, variance (n,) of the heights. Beside the fit's
     error counts that the centre of mass wanders in the body: a parabola sags by g T^2 / 8.
@@ -86,10 +87,12 @@ def describe_wrong_fall(time_s: Array, path: Array, R: Array, variance: Array) -
         return None
     large, high = ("large", "high") if off > 0 else ("small", "low")
     of_rate = abs(np.sqrt(1 + off) - 1)
-    return (
+    return WrongFall(
+        fall.gravity_m_s2,
+        sd_m_s2,
         f"in flight the centre of mass falls at {fall.gravity_m_s2:.2f} ± {sd_m_s2:.2f} m/s², not at "
         f"{GRAVITY_M_S2:.2f}: the calibration's lengths are too {large}, by {100 * abs(off):.0f} % or more, or the "
-        f"stated frame rate is too {high}, by {100 * of_rate:.0f} % or more"
+        f"stated frame rate is too {high}, by {100 * of_rate:.0f} % or more",
     )
 
 

@@ -12,11 +12,12 @@ from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.fall import UNKNOWN_SD_M, describe_wrong_fall, fit_fall, flight_rows
+from airborne.motion.flight.fall import UNKNOWN_SD_M, find_wrong_fall, fit_fall, flight_rows
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
+from airborne.tracking.self_check.free_flight import WrongFall
 from airborne.types import Array, Triple
 
 if TYPE_CHECKING:
@@ -134,18 +135,17 @@ def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
     )
 
 
-def flight_warnings(motion: Motion, table: xr.Dataset | None) -> list[str]:
+def wrong_flight(motion: Motion, table: xr.Dataset | None) -> WrongFall | None:
     """Return what a flight, as `measure_flight` gives it, says against the calibration or the frame rate.
 
     table: None of a body without masses, of which nothing is known.
     """
     rows = np.flatnonzero(motion.has_pose)
     if table is None or len(rows) < 2:
-        return []
+        return None
     com, sd = (table[name].to_numpy()[rows] for name in ("com", "com_sd"))
     variance = np.where(np.isfinite(sd[:, 2]), sd[:, 2], UNKNOWN_SD_M) ** 2
-    said = describe_wrong_fall(motion.time_s[rows], com, motion.R[rows], variance)
-    return [] if said is None else [said]
+    return find_wrong_fall(motion.time_s[rows], com, motion.R[rows], variance)
 
 
 def _as_it_falls(motion: Motion, com: Array, variance: Array) -> tuple[Array, Array]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from airborne.constants import GRAVITY_M_S2
@@ -16,6 +18,25 @@ _LEAST_M_S2, _MOST_M_S2 = 6.0, 15.0  # a fall that a wrong scale can explain
 # lead a thing on a short parabola, too
 _SLOWEST_M_S2, _FASTEST_M_S2, _LONG_S = 2.0, 45.0, 0.5
 _LEAST_SD_M_S2 = 0.03  # air, and a centre of mass that is not quite where it is taken to be
+
+
+class WrongFall(NamedTuple):
+    """A flight at another acceleration than gravity's: something in the files must be wrong."""
+
+    gravity_m_s2: float
+    gravity_sd_m_s2: float
+    sentence: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `self_check` in summary.json holds: an alarm, its value above 9.81 m/s2."""
+        return {
+            "subject": "fall",
+            "kind": "gravity_m_s2",
+            "value": self.gravity_m_s2 - GRAVITY_M_S2,
+            "sd": self.gravity_sd_m_s2,
+            "is_alarm": True,
+            "sentence": self.sentence,
+        }
 
 
 def fall(time_s: Array, position: Array, R: Array, covariance: Array) -> tuple[Array, float, float] | None:
@@ -34,8 +55,8 @@ def fall(time_s: Array, position: Array, R: Array, covariance: Array) -> tuple[A
     return weights, acceleration, float(np.hypot(_LEAST_SD_M_S2, 2 * sd))
 
 
-def describe_wrong_rate(time_s: Array, position: Array, R: Array, covariance: Array) -> str | None:
-    """Say that a body falls so slowly or fast that no wrong size explains it; None where it does not, or briefly.
+def find_wrong_rate(time_s: Array, position: Array, R: Array, covariance: Array) -> WrongFall | None:
+    """Find a body that falls so slowly or fast that no wrong size explains it; None where it does not, or briefly.
 
     The arrays are those of `fall`.
     """
@@ -43,9 +64,11 @@ def describe_wrong_rate(time_s: Array, position: Array, R: Array, covariance: Ar
     if found is None or not _SLOWEST_M_S2 < -found[1] < _FASTEST_M_S2 or _LEAST_M_S2 < -found[1] < _MOST_M_S2:
         return None
     share = float(np.sqrt(-found[1] / GRAVITY_M_S2))
-    return (
+    return WrongFall(
+        -found[1],
+        found[2],
         f"the body falls at {-found[1]:.1f} m/s² instead of {GRAVITY_M_S2:.2f}: the stated frame rate seems to be "
-        f"{share:.2f} of that at which it was filmed"
+        f"{share:.2f} of that at which it was filmed",
     )
 
 
