@@ -33,7 +33,8 @@ from airborne.body import BodyModel
 from airborne.body.chain import move_pose
 from airborne.evaluation import JointComparison, compare_joints, read_joint_paths
 from airborne.evaluation.joint_files import JointPaths
-from airborne.motion import Motion, flight_summary, measure_flight, root_angles
+from airborne.export import headline
+from airborne.motion import Motion, flight_summary, measure_flight
 from airborne.motion.files import read_motion
 from airborne.motion.run_folder import TRACKED_MOTION, read_body_run
 from airborne.run.track import track_trial
@@ -65,7 +66,7 @@ def measure_recording(data: str, folder: Path) -> Iterator[list[dict]]:
 
 def flight_rows(data: str, motion: Motion, model: BodyModel, truth: np.ndarray) -> list[dict]:
     """Return the rows of a flight whose truth has a row for each frame of the run."""
-    table, angles = measure_flight(motion, model), root_angles(motion)
+    table, head = measure_flight(motion, model), headline(motion)
     summary = flight_summary(motion, table)
     com = table["com"].to_numpy() - np.stack([truth[f"com_{axis}_m"] for axis in "xyz"], axis=-1)
     momentum = table["angular_momentum"].to_numpy()
@@ -80,10 +81,10 @@ def flight_rows(data: str, motion: Motion, model: BodyModel, truth: np.ndarray) 
         ("its median sd", "kg m2/s", np.nanmedian(sd), 4),
         ("its errors within 2 sd", "", np.mean(np.abs(error)[np.isfinite(sd)] < 2 * sd[np.isfinite(sd)]), "0.85..0.99"),
     ]
-    for column, name, found in ((0, "somersault", summary.somersault_rev), (2, "twist", summary.twist_rev)):
+    for name, found in (("somersault", summary.somersault_rev), ("twist", summary.twist_rev)):
         true = truth[f"{name}_deg"]
-        off, sd_deg = abs(found - (true[-1] - true[0]) / 360), np.hypot(*angles.sd_deg[[0, -1], column])
-        rows += [(f"{name}, off by", "turns", off, 0.02), (f"{name}, in sds", "", off / (sd_deg / 360), 2)]
+        off, sd = abs(found - (true[-1] - true[0]) / 360), head[f"{name}_rev_sd"]
+        rows += [(f"{name}, off by", "turns", off, 0.02), (f"{name}, in sds", "", off / sd, 2)]
     return [{**common, "metric": m, "unit": u, "value": float(v), "floor": f} for m, u, v, f in rows]
 
 

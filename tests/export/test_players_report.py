@@ -45,7 +45,7 @@ def test_a_height_that_nobody_saw_is_unknown_and_uncertain_frames_are_said(tmp_p
     (jump,) = measure_jumps(motion)
     row = {**jump_row(jump), "hip_height_m": np.nan, "n_uncertain": 4}
     _, first, _ = players_summary(summary_of([row]))
-    why = "a peak takes five known frames around it, seen by two cameras or more"
+    why = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
     assert first.startswith(f"one, jump 1: how high the hips rose is not known ({why})")
     assert first.endswith("; 4 of its frames are uncertain")
     page = write_players_report(tmp_path, summary_of([row]), motion).read_text()

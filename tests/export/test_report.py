@@ -49,7 +49,7 @@ def test_text_of_the_user_is_escaped_wherever_it_stands(tmp_path):
 
 def test_headline_numbers_stand_on_the_page(tmp_path):
     html = html_of(tmp_path, run(21, uncertain=(3,), lost=(20,)))
-    for words in ("21 frames: 19 tracked, 1 uncertain, 1 lost", "± 2 mm", "± 0.57°", "0.95 turns", "0.4 s"):
+    for words in ("21 frames: 19 tracked, 1 uncertain, 1 lost", "± 2 mm", "± 0.57°", "0.95 ± 0.00 turns", "0.4 s"):
         assert words in html
 
 

@@ -19,6 +19,8 @@ def test_headline_counts_frames_revolutions_and_time():
     assert head["rate_hz"] == 50
     assert head["somersault_rev"] == pytest.approx(1.0, abs=ROUNDTRIP)
     assert head["twist_rev"] == pytest.approx(0.5, abs=ROUNDTRIP)
+    sds = [head["somersault_rev_sd"], head["twist_rev_sd"]]
+    assert sds == pytest.approx([np.sqrt(2) * 0.01 / (2 * np.pi)] * 2, abs=ROUNDTRIP)  # both ends 0.01 rad
     assert head["range_m"] == pytest.approx([2.0, 0.0, 0.0], abs=ROUNDTRIP)
     assert head["median_position_sd_mm"] == pytest.approx(2.0, abs=ROUNDTRIP)
     assert head["median_rotation_sd_deg"] == pytest.approx(np.rad2deg(0.01), abs=ROUNDTRIP)
@@ -42,7 +44,7 @@ def test_only_lost_frames_between_poses_make_a_gap():
 @pytest.mark.parametrize("motion", [Motion.collect([]), run(3, lost=(0, 1, 2))], ids=["no frame", "all lost"])
 def test_a_run_without_poses_claims_no_number(motion):
     head = json_ready(headline(motion))
-    for key in ("somersault_rev", "twist_rev", "median_position_sd_mm", "median_rotation_sd_deg", "median_score"):
+    for key in ("somersault_rev", "twist_rev_sd", "median_position_sd_mm", "median_rotation_sd_deg", "median_score"):
         assert head[key] is None
     assert head["range_m"] == [None] * 3
     assert head["tilt_range_deg"] == [None] * 2

@@ -19,7 +19,14 @@ from airborne.motion.run_folder import FLIGHT, SUMMARY, read_summary
 TableRow = dict[str, Any]
 _HIGHEST_M = 1e6  # of a centre of mass: no height beyond it
 _STATUSES = ("tracked", "uncertain", "lost")
-_OF_A_BODY = ("median_position_sd_mm", "median_rotation_sd_deg", "somersault_rev", "twist_rev")
+_OF_A_BODY = (
+    "median_position_sd_mm",
+    "median_rotation_sd_deg",
+    "somersault_rev",
+    "somersault_rev_sd",
+    "twist_rev",
+    "twist_rev_sd",
+)
 _OF_A_FLIGHT = ("fitted_gravity_m_s2", "ballistic_rms_mm")
 _OF_A_JUMP = (
     "hip_height_m",

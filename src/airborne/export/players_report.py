@@ -40,7 +40,7 @@ _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
 _HEIGHTS = ("hips", "feet", "flight time", "take-off speed")
-_PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or more"
+_PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
 _JUMPS_CAPTION = (
     "Heights are in cm, each with its 95 % interval. Quote that of the hips over standing: it needs neither the moment "
     "of take-off nor that of landing, and tucked legs do not add to it. Never compare it with a height of another "

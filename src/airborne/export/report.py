@@ -163,8 +163,8 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if head["n_rotation_unobservable"] == head["n_tracked"] + head["n_uncertain"] > 0:
         yield "cannot be seen", "turns: in every frame some direction of the orientation is hidden"
     else:
-        yield _with_unit(head["somersault_rev"], "{:.2f} turns"), "somersault, first to last pose"
-        yield _with_unit(head["twist_rev"], "{:.2f} turns"), "twist, first to last pose"
+        for turn in ("somersault", "twist"):
+            yield _turns(head[f"{turn}_rev"], head.get(f"{turn}_rev_sd")), f"{turn}, first to last pose"
         low, high = head["tilt_range_deg"]
         yield UNKNOWN_TEXT if low is None else f"{round(low)}° to {round(high)}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
@@ -184,6 +184,11 @@ def _median_sd(head: Mapping[str, Any], what: str, unit: str) -> str:
 
 def _with_unit(value: float | None, form: str) -> str:
     return UNKNOWN_TEXT if value is None else form.format(value).replace("-", "−")
+
+
+def _turns(turns: float | None, sd: float | None) -> str:
+    """Return a number of turns with its standard deviation, where that is known."""
+    return _with_unit(turns, "{:.2f} turns" if sd is None or turns is None else f"{{:.2f}} ± {sd:.2f} turns")
 
 
 def _comparisons(summary: Mapping[str, Any]) -> Iterator[_Comparison]:

@@ -36,7 +36,8 @@ def headline(motion: Motion) -> dict[str, Any]:
     - `median_position_sd_mm`, `median_rotation_sd_deg`: of each frame's root mean square over the three axes;
       infinite where most frames do not show some direction
     - `range_m`: largest minus smallest x, y, z; `tilt_range_deg`: smallest and largest
-    - `somersault_rev`, `twist_rev`: revolutions from the first to the last frame with a pose
+    - `somersault_rev`, `twist_rev`: revolutions from the first to the last frame with a pose; `somersault_rev_sd`,
+      `twist_rev_sd`: of both ends together
     - `n_position_unobservable`, `n_rotation_unobservable`: frames with an infinite variance
     - `n_near_singular`: frames within 5 degrees of 90 degrees of tilt
     - `has_gap`: lost frames lie between frames with a pose, so that whole revolutions may be miscounted
@@ -45,6 +46,7 @@ def headline(motion: Motion) -> dict[str, Any]:
     rows = np.flatnonzero(has_pose)
     angles = root_angles(motion)
     somersault, tilt, twist = angles.deg[has_pose].T
+    somersault_sd, _, twist_sd = angles.sd_deg[has_pose].T
     position_sd, rotation_sd = motion.position_sd[has_pose], motion.rotation_sd[has_pose]
     ends = motion.time_s[[0, -1]] if len(motion) else np.full(2, np.nan)
     return {
@@ -61,8 +63,10 @@ def headline(motion: Motion) -> dict[str, Any]:
         "median_rotation_sd_deg": math.degrees(_median(_rms_over_axes(rotation_sd))),
         "range_m": np.ptp(motion.position[has_pose], axis=0).tolist() if len(rows) else [math.nan] * 3,
         "somersault_rev": _revolutions(somersault),
+        "somersault_rev_sd": _of_both_ends(somersault_sd),
         "tilt_range_deg": [float(tilt.min()), float(tilt.max())] if len(rows) else [math.nan] * 2,
         "twist_rev": _revolutions(twist),
+        "twist_rev_sd": _of_both_ends(twist_sd),
         "n_position_unobservable": int(np.isinf(position_sd).any(axis=1).sum()),
         "n_rotation_unobservable": int(np.isinf(rotation_sd).any(axis=1).sum()),
         "n_near_singular": int(angles.is_singular[rows].sum()),
@@ -148,6 +152,10 @@ def _rms_over_axes(sd: Array) -> Array:
 def _median(values: Array) -> float:
     present = values[~np.isnan(values)]
     return float(np.median(present)) if len(present) else math.nan
+
+
+def _of_both_ends(sd_deg: Array) -> float:
+    return float(np.hypot(sd_deg[0], sd_deg[-1])) / 360 if len(sd_deg) > 1 else math.nan
 
 
 def _revolutions(angle_deg: Array) -> float:

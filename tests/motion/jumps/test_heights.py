@@ -316,6 +316,12 @@ def test_reach_is_the_higher_wrist_at_its_peak(clean):
     assert jump.reach_m.value == pytest.approx(legs[:, 0, 0, 2].max() + 1.3, abs=2e-3)
 
 
+def test_a_player_of_whom_no_frame_is_tracked_has_no_height():
+    motion = motion_of(CLEAN)
+    jump = only(replace(motion, joint_status=np.full(motion.joint_status.shape, "uncertain")))
+    assert np.isnan([*jump.hip_height_m, *jump.foot_height_m, *jump.flight_time_height_m]).all()
+
+
 def test_uncertain_frames_of_the_flight_are_counted_and_those_of_the_floor_are_not():
     motion = motion_of(CLEAN)
     status = motion.joint_status.astype("U9")

@@ -31,7 +31,7 @@ class LegTrack:
     index: NDArray[np.int64]  # (n,) frame numbers
     time_s: Array  # (n,)
     is_uncertain: NDArray[np.bool_]  # (n,) according to the tracker
-    is_measured: NDArray[np.bool_]  # (n,) by two cameras or more, or tracked
+    is_measured: NDArray[np.bool_]  # (n,) by two cameras or more, or tracked; nowhere if no frame is tracked
     hips: Array  # (n, 2, 3)
     knees: Array  # (n, 2, 3)
     ankles: Array  # (n, 2, 3)
@@ -99,7 +99,7 @@ def extract_legs(motion: PlayersMotion, player: str) -> LegTrack:
         index=motion.index,
         time_s=motion.time_s,
         is_uncertain=motion.status[:, who] == Status.UNCERTAIN.value,
-        is_measured=(motion.n_views[:, who] >= _FEWEST_VIEWS) | (motion.status[:, who] == Status.TRACKED.value),
+        is_measured=_is_measured(motion, who),
         hips=parts["hip"][0],
         knees=parts["knee"][0],
         ankles=parts["ankle"][0],
@@ -107,6 +107,12 @@ def extract_legs(motion: PlayersMotion, player: str) -> LegTrack:
         wrists=parts["wrist"][0] if "wrist" in parts else None,
         variances={keys[part]: variance for part, (_, variance) in parts.items()},
     )
+
+
+def _is_measured(motion: PlayersMotion, who: int) -> NDArray[np.bool_]:
+    """Tell which frames (n,) can carry a number: none where no frame of the run is tracked."""
+    is_tracked = motion.status[:, who] == Status.TRACKED.value
+    return is_tracked | ((motion.n_views[:, who] >= _FEWEST_VIEWS) & is_tracked.any())
 
 
 def _remove_spikes(points: Array, variance: Array) -> Array:
