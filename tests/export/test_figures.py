@@ -20,13 +20,14 @@ from airborne.export.error_figures import (
 from airborne.export.figures import (
     JOINT_COLOURS,
     joint_status_figure,
+    joints_figure,
     write_figures,
     write_flight_figure,
     write_joints_figure,
     write_pose,
 )
 from airborne.motion import JointStatus, joint_statuses, landmarks
-from airborne.motion.joints import main_joints
+from airborne.motion.joints import doubtful_segments, main_joints
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 from tests.support.tolerances import ROUNDTRIP
 
@@ -138,9 +139,9 @@ def plotted(monkeypatch):
     by_axes, plotted = {}, {}
     draw_estimate, label_panel = panels.draw_estimate, panels.label_panel
 
-    def draw(axes, motion, values):
+    def draw(axes, motion, values, *statuses):
         by_axes[axes] = values
-        draw_estimate(axes, motion, values)
+        draw_estimate(axes, motion, values, *statuses)
 
     def label(axes, text):
         plotted[text] = by_axes[axes]
@@ -183,6 +184,17 @@ def test_an_unobservable_joint_is_marked(tmp_path):
     write_joints_figure(tmp_path / "seen.png", person_run(), PERSON)
     write_joints_figure(tmp_path / "unseen.png", person_run(unseen=(5, 6)), PERSON)
     assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
+
+
+def test_an_angle_is_uncertain_where_one_of_its_segments_is_not_tracked():
+    motion = person_run(unseen=(5,))
+    shown = joints_figure(motion, PERSON)
+    said = [text.get_text() for text in shown.legends[0].get_texts()]
+    doubtful = doubtful_segments(motion, PERSON)
+    at = [PERSON.index_of(segment) for segment, *_ in main_joints(motion.joints)]
+    n = sum(int(doubtful[:, [k, PERSON.parents[k]]].any(axis=1).sum()) for k in at)
+    assert 0 < n < 8 * len(motion)
+    assert f"tracked ({8 * len(motion) - n})" in said and f"uncertain ({n})" in said
 
 
 def test_the_status_of_each_joint_is_drawn_over_the_whole_run():

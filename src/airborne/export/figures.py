@@ -25,7 +25,7 @@ from airborne.motion import (
     measure_flight,
     root_angles,
 )
-from airborne.motion.joints import main_joints
+from airborne.motion.joints import doubtful_segments, main_joints
 from airborne.tracking import Status
 
 _AXIS_STYLES = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
@@ -117,7 +117,8 @@ def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
 def joints_figure(motion: Motion, model: BodyModel) -> Figure:
     """Draw the angles of the main joints over time [deg], left beside right, with bands of two standard deviations.
 
-    Where the images do not show an angle, it is left out. Of a person shoulders, elbows, hips and knees: the x angle,
+    Where the images do not show an angle, it is left out; where either of its segments is not tracked, the angle is
+    uncertain. Of a person shoulders, elbows, hips and knees: the x angle,
     flexion positive. Of another body the x angles of its first joints.
 
     Raises ResultError where the motion is another body's.
@@ -126,6 +127,7 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
     if not joint_panels:
         raise ResultError("this body has no joints, so there are no angles of joints to draw")
     unobservable, singular = np.zeros((2, len(motion)), bool)
+    doubtful, statuses = doubtful_segments(motion, model), []
     figure, grid = panels.panel_figure(-(-len(joint_panels) // 2), 2, row_in=1.6)
     cells = [axes for row in grid for axes in row]
     for axes, (segment, label, sign) in zip(cells, joint_panels, strict=False):
@@ -134,7 +136,10 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         is_unobservable, is_singular = np.isinf(sd), of_joint["is_singular"].to_numpy() & motion.has_pose
         values = np.where(is_unobservable, np.nan, values)
         panels.draw_band(axes, motion.time_s, sign * values, sd)
-        panels.draw_estimate(axes, motion, sign * values)
+        at = model.index_of(segment)
+        is_doubtful = doubtful[:, [at, model.parents[at]]].any(axis=1) & motion.has_pose
+        statuses.append(np.where(is_doubtful, Status.UNCERTAIN.value, motion.status))
+        panels.draw_estimate(axes, motion, sign * values, statuses[-1])
         panels.shade_spans(axes, motion.time_s, is_unobservable, panels.UNOBSERVABLE_STYLE)
         panels.shade_spans(axes, motion.time_s, is_singular, panels.SINGULAR_STYLE)
         panels.label_panel(axes, f"{label} [°]")
@@ -145,7 +150,9 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         *panels.unobservable_handles(unobservable),
         *panels.singular_handles(singular, "y near ±90°: x and z mix"),
     ]
-    return panels.add_legend(figure, motion, [panels.band_handle(_TWO_SD), *handles])
+    return panels.draw_legend(
+        figure, [*panels.status_handles(np.array(statuses)), panels.band_handle(_TWO_SD), *handles]
+    )
 
 
 def joint_status_figure(motion: Motion, model: BodyModel) -> Figure:

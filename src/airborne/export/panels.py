@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from airborne.export.palette import ESTIMATE_RGB, STATUS_RGB, TEXT_RGB, hex_colour
 from airborne.io.figures import save_png
@@ -52,11 +53,12 @@ def label_panel(axes: Axes, label: str) -> None:
     axes.ticklabel_format(axis="y", useOffset=False, style="plain")
 
 
-def draw_estimate(axes: Axes, motion: Motion, values: Array) -> None:
-    """Draw values (n,) with a marker for each status; gaps stay gaps, and lost frames are shaded."""
+def draw_estimate(axes: Axes, motion: Motion, values: Array, of_frames: NDArray[np.str_] | None = None) -> None:
+    """Draw values (n,) with a marker for each status, the motion's if not given; lost frames are shaded gaps."""
+    of_frames = motion.status if of_frames is None else of_frames
     axes.plot(motion.time_s, values, color=LINE, linewidth=1.0)
     for status, marker in _MARKERS.items():
-        has_status = motion.status == status.value
+        has_status = of_frames == status.value
         axes.plot(
             motion.time_s[has_status], values[has_status], marker, color=hex_colour(STATUS_RGB[status]), markersize=2.8
         )
@@ -88,7 +90,12 @@ def save_figure(figure: Figure, path: Path, motion: Motion, extra: Sequence[Arti
 
 def add_legend(figure: Figure, motion: Motion, extra: Sequence[Artist] = ()) -> Figure:
     """Add the legend on top: the statuses with their numbers of frames, and what else is given."""
-    counts = {status: motion.count(status) for status in Status}
+    return draw_legend(figure, [*status_handles(motion.status), *extra])
+
+
+def status_handles(statuses: NDArray[np.str_]) -> list[Artist]:
+    """Return the legend's entries for statuses, of any shape, with how many there are."""
+    counts = {status: int(np.count_nonzero(statuses == status.value)) for status in Status}
     handles: list[Artist] = [
         Line2D([], [], color=LINE, marker=marker, markerfacecolor=hex_colour(STATUS_RGB[status]), markeredgewidth=0,
                markersize=4, label=f"{status} ({counts[status]})")
@@ -97,7 +104,7 @@ def add_legend(figure: Figure, motion: Motion, extra: Sequence[Artist] = ()) -> 
     ]  # fmt: skip
     if counts[Status.LOST]:
         handles.append(Patch(**LOST_STYLE, label=f"lost ({counts[Status.LOST]})"))
-    return draw_legend(figure, [*handles, *extra])
+    return handles
 
 
 def draw_legend(figure: Figure, handles: Sequence[Artist]) -> Figure:

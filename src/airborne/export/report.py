@@ -37,8 +37,9 @@ _FIGURES = {  # titles and captions, in the order of the page
     ),
     "joints.png": (
         "Joints",
-        "How the main joints are bent over time. Of a person: flexion is positive, and zero is standing upright with "
-        "hanging arms. Of another body: the x angles. Turns about the other axes are in joint_angles.csv.",
+        "How the main joints are bent over time, amber where one of a joint's segments is not tracked. Of a person: "
+        "flexion is positive, and zero is standing upright with hanging arms. Of another body: the x angles. Turns "
+        "about the other axes are in joint_angles.csv.",
     ),
     "joint_status.png": (
         "How far each joint can be trusted",
