@@ -116,6 +116,13 @@ def test_millimetres_given_as_metres_are_refused(points, sizes):
     assert message == ("the control points span 3368 m, expected a scene in metres: divide by 1000 if they are in mm")
 
 
+def test_a_single_point_in_millimetres_is_named(points, sizes):
+    world = points.world.copy()
+    world[6] *= 1000
+    message = error_of(replace(points, world=world), sizes)
+    assert message.startswith("a control point lies 2520 m from the others, which span 3.4 m (P07)")
+
+
 def test_a_hundred_metres_are_flagged(points, sizes):
     warnings = warnings_of(replace(points, world=points.world * 100), sizes, "cam3")
     assert "the control points span 337 m: are they in metres?" in warnings
@@ -135,3 +142,21 @@ def test_a_rough_fit_is_reported(points, sizes):
     noise = np.random.default_rng(0).normal(0, 4, (24, 2))
     rough = clicked(points, "cam1", lambda px: np.clip(px + noise, 0, [767, 575]))
     assert "fits its control points only to" in " ".join(warnings_of(rough, sizes, "cam1"))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("stretch", [0.9, 1.1])
+def test_a_stretched_axis_of_the_world_is_named_and_no_pixels_are_blamed(points, sizes, axis, stretch):
+    world = points.world * np.where(np.arange(3) == axis, stretch, 1.0)
+    findings = calibrate(replace(points, world=world), sizes).findings
+    [found] = [each for each in findings if each.kind == "stretched"]
+    assert (
+        found.what == f"with {'xyz'[axis]}_m multiplied by {1 / stretch:.2f}, the pixels of all cameras would be square"
+    )
+    assert "squeezed" not in [each.kind for each in findings]
+
+
+def test_pixels_of_all_cameras_that_are_not_square_are_no_stretched_world(points, sizes):
+    flat = replace(points, px=points.px * [1, 0.8])
+    kinds = [each.kind for each in calibrate(flat, {name: (768, 461) for name in sizes}).findings]
+    assert kinds.count("squeezed") == len(sizes) and "stretched" not in kinds

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 from scipy.special import fdtrc
 
 from airborne.calibration.intrinsics.model_selection import Solution, leave_one_out
 from airborne.calibration.intrinsics.physical import fit_pinhole
 from airborne.calibration.sources.control_points import ControlPoints
 from airborne.cameras.dlt import FEWEST_DLT_POINTS, Decomposition, decompose, fit_dlt
-from airborne.cameras.finding import Finding
+from airborne.cameras.finding import Finding, join_names
 from airborne.errors import CalibrationError, count
 from airborne.geometry.triangulation import px_from_points
 from airborne.types import Array
@@ -23,6 +24,8 @@ _ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
 _BENT = 3.0  # times a model's residuals: what the direct linear transformation may leave of a straight lens
 _OFF_CENTRE = 0.15  # of the image's diagonal
 _NOT_SQUARE = 0.03  # relative difference of the focal lengths that is reported
+_MOST_STRETCH = 2.0  # chosen: of an axis of the points, either way, that is tried
+_FAR = 50.0  # chosen: times the others' distance from their median; in millimetres a point is 1000 times as far
 _MOST_ROLL = np.radians(60)  # about the optical axis: cameras stand roughly upright
 _SIGNIFICANCE = 1e-4  # of rejecting a point of a good set
 _MOST_OUTLIERS = 3  # named for each camera
@@ -35,6 +38,7 @@ def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) ->
         raise CalibrationError(f"no image size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
     extent = np.linalg.norm(np.ptp(points.world, axis=0))
     if extent > _LARGEST_EXTENT_M:
+        _refuse_far_points(points)
         raise CalibrationError(
             f"the control points span {extent:.0f} m, expected a scene in metres: divide by 1000 if they are in mm"
         )
@@ -52,6 +56,20 @@ def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) ->
                 f"the control points of camera '{camera}' lie in one plane (thickness / extent {ratio:.4f}, "
                 f"at least {_FLAT_ERROR} is needed): add points off that plane"
             )
+
+
+def _refuse_far_points(points: ControlPoints) -> None:
+    """Raise CalibrationError, naming them, where a few points lie far from all others: their unit may be another."""
+    from_middle = np.linalg.norm(points.world - np.median(points.world, axis=0), axis=1)
+    is_far = from_middle > _FAR * np.median(from_middle)
+    if is_far.any():
+        names = join_names([points.names[k] for k in np.flatnonzero(is_far)[:_MOST_OUTLIERS]])
+        what = "a control point lies" if is_far.sum() == 1 else f"{is_far.sum()} control points lie"
+        raise CalibrationError(
+            f"{what} {from_middle[is_far].max():.0f} m from the others, which span "
+            f"{np.linalg.norm(np.ptp(points.world[~is_far], axis=0)):.1f} m ({names}): correct x_m, y_m, z_m; divide "
+            "by 1000 what is in mm"
+        )
 
 
 def _check_inside(points: ControlPoints, camera: str, size: tuple[int, int]) -> None:
@@ -111,11 +129,14 @@ def check_solutions(
     if extent > _LARGE_EXTENT_M:
         what = f"the control points span {extent:.0f} m"
         findings.append(Finding(kind="units", what=what, advice="are they in metres?"))
+    stretched = list(_check_stretch([decompositions[name] for name in points.cameras]))
+    findings += stretched
     outliers = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
     findings += _check_outliers(points, outliers)
     for camera in points.cameras:
         if _is_straight(solutions[camera]):  # else the decomposition says little
-            findings += _check_image(camera, sizes[camera], decompositions[camera])
+            found = _check_image(camera, sizes[camera], decompositions[camera])
+            findings += [each for each in found if each.kind != "squeezed" or not stretched]
         ratio = flatness(solutions[camera].world)
         if ratio < _FLAT_WARNING:
             what = f"the control points of camera '{camera}' are nearly flat (thickness / extent {ratio:.3f})"
@@ -127,6 +148,32 @@ def check_solutions(
             advice = "check its points, their coordinates and the image size"
             findings.append(Finding(kind="misfit", what=what, advice=advice, cameras=(camera,)))
     return tuple(findings)
+
+
+def _check_stretch(cameras: Sequence[Decomposition]) -> Iterator[Finding]:
+    """Yield a finding where one axis of the points, stretched, explains pixels of several cameras that are not square.
+
+    Where a table's axis is divided by s, a camera's K R has the column of that axis multiplied by s.
+    """
+
+    def log_ratios(log_stretch: float, axis: int) -> Array:
+        columns = np.where(np.arange(3) == axis, np.exp(log_stretch), 1.0)
+        K = [decompose(np.column_stack([each.K @ each.R * columns, np.zeros(3)])).K for each in cameras]
+        return np.log([k[0, 0] / k[1, 1] for k in K])
+
+    def misfit(log_stretch: float, axis: int) -> float:
+        return float(np.sum(log_ratios(log_stretch, axis) ** 2))
+
+    if np.count_nonzero(np.abs(log_ratios(0.0, 0)) > _NOT_SQUARE) < 2:
+        return
+    bounds = np.log(_MOST_STRETCH) * np.array([-1.0, 1.0])
+    fits = [minimize_scalar(misfit, bounds=bounds, method="bounded", args=(axis,)) for axis in range(3)]
+    axis = int(np.argmin([fit.fun for fit in fits]))
+    found = float(fits[axis].x)
+    if np.abs(log_ratios(found, axis)).max() < _NOT_SQUARE < abs(found):
+        name = f"{'xyz'[axis]}_m"
+        what = f"with {name} multiplied by {np.exp(-found):.2f}, the pixels of all cameras would be square"
+        yield Finding(kind="stretched", what=what, advice=f"check the points' {name}")
 
 
 def _is_straight(solution: Solution) -> bool:
