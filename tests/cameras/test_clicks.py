@@ -28,6 +28,17 @@ def test_camera_without_columns_saw_nothing_and_others_do_not_matter(tmp_path):
         read_clicks(write(tmp_path, CLICKS), ["left", "above"])
 
 
+def test_the_same_clicks_given_to_two_cameras_are_refused(tmp_path):
+    rows = ["a,1,2,1,2", "b,3,4,3,4", "c,5,6,5,6", "d,7,8,,"]
+    table = write(tmp_path, "\n".join(["point,left_u,left_v,right_u,right_v", *rows]))
+    with pytest.raises(
+        CalibrationError, match=r"points\.csv: cameras left and right have the same 3 clicks; give each"
+    ):
+        read_clicks(table, ["left", "right"])
+    rows[2] = "c,5,6,5,6.5"
+    assert read_clicks(write(tmp_path, "\n".join(["point,left_u,left_v,right_u,right_v", *rows])), ["left", "right"])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -8,6 +8,7 @@ import pytest
 from airborne.calibration.from_points import calibrate
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import Rig, write_rig
+from airborne.errors import TrialError
 from airborne.run.track import track_trial
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.file import read_trial
@@ -51,3 +52,11 @@ def test_deviations_are_those_of_the_calibration_from_points(folder):
 def test_a_file_that_says_nothing_of_its_errors_takes_what_is_usual_and_says_so(folder):
     usual = run_with(folder, "usual", 'file = "silent.toml"')
     assert any("does not say how good" in text for text in usual.summary["warnings"])
+
+
+def test_two_cameras_cannot_stand_in_the_same_place(folder):
+    rig = calibrated_rig(folder)
+    twice = replace(rig["cam1"], name="cam2")
+    write_rig(folder / "twice.toml", Rig((rig["cam1"], twice, rig["cam3"])))
+    with pytest.raises(TrialError, match=r"cameras cam1 and cam2 have the same place and turn in twice\.toml; each"):
+        run_with(folder, "same", 'file = "twice.toml"')

@@ -100,8 +100,8 @@ def test_exchanged_videos_and_a_mirrored_one_are_named_before_anything_is_tracke
     (folder / "cam3.mp4").rename(folder / "cam2.mp4")
     (folder / "other.mp4").rename(folder / "cam3.mp4")
     (mistake,) = check_trial(folder / "trial.toml").mistakes
-    assert "the videos of cam2 and cam3 are exchanged" in mistake
-    with pytest.raises(MistakesError, match="the videos of cam2 and cam3 are exchanged"):
+    assert "the videos of cam2 and cam3, or their calibrations, are exchanged" in mistake
+    with pytest.raises(MistakesError, match="the videos of cam2 and cam3, or their calibrations, are exchanged"):
         track_trial(read_trial(folder / "trial.toml"), folder / "out")
     assert not (folder / "out").exists()
 

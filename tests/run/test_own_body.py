@@ -99,7 +99,7 @@ def test_exchanged_videos_are_refused_as_where_the_trial_is_tracked(shared_data,
     trial = read_trial(shared_data("somersault_1") / "trial.toml")
     one, two, *others = trial.camera
     exchanged = [one.model_copy(update={"video": two.video}), two.model_copy(update={"video": one.video}), *others]
-    with pytest.raises(MistakesError, match="the videos of cam1 and cam2 are exchanged"):
+    with pytest.raises(MistakesError, match="the videos of cam1 and cam2, or their calibrations, are exchanged"):
         fit_person(trial.model_copy(update={"camera": exchanged}), tmp_path / "person.toml")
     assert not list(tmp_path.iterdir())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ import numpy as np
 from airborne.errors import CalibrationError
 from airborne.io.text import read_csv
 from airborne.types import Array
+
+_FEWEST_SAME = 3  # chosen: of points that two cameras show at the very same pixels; one or two may by chance
 
 
 def read_clicks(path: Path, cameras: Sequence[str], fewest: int = 2) -> tuple[tuple[str, ...], Array]:
@@ -37,7 +40,18 @@ def read_clicks(path: Path, cameras: Sequence[str], fewest: int = 2) -> tuple[tu
             f"{path.name}: point '{names[row]}' has only one of {cameras[column]}_u and {cameras[column]}_v; "
             "give both, or leave both blank"
         )
+    refuse_same_clicks(path.name, cameras, px)
     return names, px
+
+
+def refuse_same_clicks(where: str, cameras: Sequence[str], px: Array) -> None:
+    """Raise CalibrationError where two cameras have the very same clicks, px (points, cameras, 2), NaN if not seen."""
+    for a, b in combinations(range(len(cameras)), 2):
+        pairs = px[:, [a, b]][np.isfinite(px[:, [a, b]]).all(axis=(1, 2))]
+        if len(pairs) >= _FEWEST_SAME and np.array_equal(pairs[:, 0], pairs[:, 1]):
+            raise CalibrationError(
+                f"{where}: cameras {cameras[a]} and {cameras[b]} have the same {len(pairs)} clicks; give each its own"
+            )
 
 
 def read_positions(path: Path) -> dict[str, Array]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from airborne.cameras import Rig
-from airborne.cameras.clicks import read_clicks, read_positions
+from airborne.cameras.clicks import read_clicks, read_positions, refuse_same_clicks
 from airborne.cameras.consensus import triangulate_consensus
 from airborne.errors import TrialError
 from airborne.trial.file import Trial
@@ -30,7 +30,8 @@ def read_pixels(
 ) -> tuple[tuple[str, ...], Array]:
     """Return the names of clicked points and their pixels (points, cameras, 2) [px], NaN where not seen.
 
-    Raises CalibrationError for an unusable table, as one with fewer than `fewest` of the cameras.
+    Raises CalibrationError for an unusable table, as one with fewer than `fewest` of the cameras, and where two cameras
+    have the very same clicks.
     """
     if isinstance(points_px, str):
         return read_clicks(trial.path(points_px), cameras, fewest)
@@ -39,6 +40,7 @@ def read_pixels(
         for camera, pixel in by_camera.items():
             if camera in cameras:  # the trial has it, but a run may leave it out
                 px[row, cameras.index(camera)] = pixel
+    refuse_same_clicks(f"{trial.name}, points_px", cameras, px)
     return names, px
 
 

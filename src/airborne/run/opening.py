@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -125,7 +126,14 @@ def read_or_calibrate(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[
         require_plausible(calibration)
         return calibration.rig, calibration
     rig = read_rig(trial.path(trial.calibration.file or ""))
-    return Rig(tuple(_camera_as_saved(rig, camera, sizes[camera.name]) for camera in trial.camera)), None
+    cameras = tuple(_camera_as_saved(rig, camera, sizes[camera.name]) for camera in trial.camera)
+    for a, b in combinations(cameras, 2):
+        if np.array_equal(a.camera_from_world.as_matrix(), b.camera_from_world.as_matrix()):
+            raise TrialError(
+                f"cameras {a.name} and {b.name} have the same place and turn in {trial.calibration.file}; each needs a "
+                "calibration of its own"
+            )
+    return Rig(cameras), None
 
 
 def _camera_as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:

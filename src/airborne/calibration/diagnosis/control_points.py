@@ -11,6 +11,7 @@ from scipy.special import fdtrc
 from airborne.calibration.intrinsics.model_selection import Solution, leave_one_out
 from airborne.calibration.intrinsics.physical import fit_pinhole
 from airborne.calibration.sources.control_points import ControlPoints
+from airborne.cameras.clicks import refuse_same_clicks
 from airborne.cameras.dlt import FEWEST_DLT_POINTS, Decomposition, decompose, fit_dlt
 from airborne.cameras.finding import Finding, join_names
 from airborne.errors import CalibrationError, count
@@ -36,6 +37,7 @@ def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) ->
     missing = [camera for camera in points.cameras if camera not in sizes]
     if missing:
         raise CalibrationError(f"no image size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
+    refuse_same_clicks("the control points", points.cameras, points.px)
     extent = np.linalg.norm(np.ptp(points.world, axis=0))
     if extent > _LARGEST_EXTENT_M:
         _refuse_far_points(points)
