@@ -14,7 +14,7 @@ from airborne.calibration.from_points import Calibration
 from airborne.export.overlays import OverlaysAs
 from airborne.export.players_overlay import PlayersOverlayVideos
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
-from airborne.motion.jumps.heights import LEAST_RATE_HZ, measure_jumps
+from airborne.motion.jumps.heights import LEAST_RATE_HZ, describe_slow_falls, measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
@@ -134,6 +134,7 @@ class PlayersRun:
         motion = read_players(folder / self.table)
         write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)
         jumps = measure_jumps(motion)
+        self.recording.events.extend(describe_slow_falls(motion))
         write_jumps(folder / JUMPS, jumps)
         return motion, {**self._summary(motion), "jumps": [jump_row(jump) for jump in jumps]}
 

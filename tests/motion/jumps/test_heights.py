@@ -1,5 +1,6 @@
 """Jumps of a jumper by closed formulas: heights are recovered, unobserved events unreported, intervals calibrated."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.motion.free_fall import free_fall_height, noise_covariance
-from airborne.motion.jumps.heights import measure_jumps
+from airborne.motion.jumps.heights import describe_slow_falls, measure_jumps
 from airborne.motion.jumps.standing_posture import leg_lengths
 from airborne.motion.local_polynomials import local_fits
 from tests.support.jumping import FLAT_M, HEEL_M, LEG_M, SHARE, G, Jumper, first_legs, motion_of, noise, players_motion
@@ -314,6 +315,17 @@ def test_reach_is_the_higher_wrist_at_its_peak(clean):
     joints = (*motion_of(CLEAN).joints, "wrist_left", "wrist_right")
     jump = only(players_motion(CLEAN.time_s, np.concatenate([legs, wrists], axis=2), joints=joints))
     assert jump.reach_m.value == pytest.approx(legs[:, 0, 0, 2].max() + 1.3, abs=2e-3)
+
+
+@pytest.mark.parametrize("share", [0.4, 0.5, 1.0])
+def test_a_jump_filmed_at_more_images_than_stated_is_said_to_fall_slowly(share):
+    motion = motion_of(CLEAN)
+    slow = replace(motion, time_s=motion.time_s / share)
+    said = describe_slow_falls(slow)
+    assert (len(measure_jumps(slow)), len(said)) == ((1, 0) if share == 1 else (0, 1))
+    if said:
+        found = re.search(r"falls at (.*) m/s², not at 9\.81.* is (.*) of that at which", said[0])
+        assert [float(each) for each in found.groups()] == pytest.approx([G * share**2, share], rel=0.1)
 
 
 def test_a_player_of_whom_no_frame_is_tracked_has_no_height():

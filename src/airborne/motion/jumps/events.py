@@ -31,6 +31,8 @@ _GRID_S = 1 / 480  # at which the posterior of an event is computed
 _MOST_SD_S = 0.03  # events with a larger standard deviation are not reported
 _NEAR_S = 0.06  # from an event, chosen: three frames of 60 images a second on either side
 _SLOWEST_FALL_M_S2 = -5.0  # about half of gravity: a body that falls more slowly is supported
+_LEAST_FALL_M_S2 = -1.0  # chosen: a jump filmed at three times the stated rate falls at 9.81 / 9
+_CLEAR_SDS = 4.0  # of an acceleration
 _ANKLE_RISE_M = {True: (0.09, 0.02), False: (0.06, 0.025)}  # at take-off, at landing: mean, standard deviation
 _FOREFOOT_RISE_M = {True: (0.02, 0.01), False: (0.012, 0.01)}  # the toes are the last to leave
 _STANDING_WINDOW_S, _STANDING_QUANTILE = 0.25, 0.2  # means over such windows; quantile of them that is standing
@@ -63,15 +65,29 @@ def standing_height(time_s: Array, height_m: Array) -> float:
 
 def find_flights(track: LegTrack) -> tuple[tuple[int, int], ...]:
     """Return the first and last row of each flight: both ankles high, and the body in free fall."""
+    return tuple(run for run in _airborne_runs(track) if _may_fall_freely(*fall_of(track, run)))
+
+
+def find_slow_falls(track: LegTrack) -> tuple[tuple[int, int], ...]:
+    """Return the first and last row of each time with both ankles high in which the body falls, yet slower than freely.
+
+    So falls a jump that was filmed at more images a second than its video says.
+    """
+    found = [(run, *fall_of(track, run)) for run in _airborne_runs(track)]
+    return tuple(run for run, g, sd in found if not _may_fall_freely(g, sd) and g + _CLEAR_SDS * sd < _LEAST_FALL_M_S2)
+
+
+def _airborne_runs(track: LegTrack) -> list[tuple[int, int]]:
+    """Return the first and last row of each time in which both ankles are clearly over their standing height."""
     if len(track.time_s) < 2:
-        return ()
+        return []
     height = np.min(track.ankles[:, :, 2] - _standing_ankle_heights(track, np.ones(len(track.time_s), bool)), axis=1)
     runs = _runs(track, height)
     on_floor = np.ones(len(height), bool)
     for first, last in runs:
         on_floor[first : last + 1] = False
     height = np.min(track.ankles[:, :, 2] - _standing_ankle_heights(track, on_floor), axis=1)
-    return tuple(run for run in _runs(track, height) if _is_free_fall(track, run))
+    return _runs(track, height)
 
 
 def sample_flight(
@@ -149,16 +165,22 @@ def _belongs_to_run(track: LegTrack, smooth: Array, last: int, row: int) -> bool
     return bool(gap_s <= (_BRIDGE_S if is_gap else _DIP_S))
 
 
-def _is_free_fall(track: LegTrack, rows: tuple[int, int]) -> bool:
-    """Test whether the body may be in free fall: at least five known frames, accelerated downward."""
+def fall_of(track: LegTrack, rows: tuple[int, int]) -> tuple[float, float]:
+    """Return the centre of mass's upward acceleration in a run of rows, and its sd [m/s2].
+
+    NaN where fewer than five frames are known.
+    """
     time_s, height, variance = _centre_of_mass_heights(track, rows[0], rows[1] + 1)
     if len(time_s) < 5:
-        return False
+        return np.nan, np.nan
     weight = np.linalg.inv(noise_covariance(time_s, variance, sway_m=SWAY_M))
     terms = np.vander(time_s - time_s.mean(), 3)
     covariance = np.linalg.inv(terms.T @ weight @ terms)
-    acceleration = 2 * (covariance @ terms.T @ weight @ height)[0]
-    return bool(acceleration - 4 * np.sqrt(covariance[0, 0]) < _SLOWEST_FALL_M_S2)
+    return float(2 * (covariance @ terms.T @ weight @ height)[0]), float(np.sqrt(covariance[0, 0]))
+
+
+def _may_fall_freely(acceleration: float, sd: float) -> bool:
+    return acceleration - _CLEAR_SDS * sd < _SLOWEST_FALL_M_S2
 
 
 def _centre_of_mass_heights(track: LegTrack, start: int, stop: int) -> tuple[Array, Array, Array]:
