@@ -13,14 +13,18 @@ from airborne.cameras import Rig
 from airborne.errors import count_of
 from airborne.motion import Motion
 from airborne.tracking import Doubt, Status
+from airborne.tracking.model_based.status import UNCERTAIN_SD_M
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
 from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong_rate
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.self_check.nuisances import MEASURED_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.roughness import roughness
+from airborne.types import Array
 
 # of the sizes of body and world, chosen: at a rate 10 % too low those of a throw were 23.2 and 23.4 %
 _ALIKE = 0.1
+_CLEARLY_ROUGH = 1.5  # chosen: a factor on standard deviations from which on it is said
 _UNKNOWN_SIZE = (
     "self-check: to one camera only a free fall shows how large a body is, and none was measured: "
     "distances are as right as the sizes in the body's file"
@@ -58,6 +62,10 @@ def check_run(
     frames = sorted(kept, key=lambda each: each.index)
     poses = [motion.pose(row) for row in rows]
     path = TrackedPath(motion.index[rows], motion.time_s[rows], poses, motion.covariance[rows, :6, :6])
+    rough = np.ones(2) if model.has_joints else roughness(path, motion.status[rows] == Status.TRACKED.value)
+    if rough.max() > 1:  # never of people, who are smoothed with the whole run in view
+        motion = _widen(motion, rough)
+        path = replace(path, covariance=motion.covariance[rows])
     body_sd = PRESET_SD if is_preset else MEASURED_SD
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
@@ -67,6 +75,12 @@ def check_run(
         status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):
             sentences.append(f"self-check: {count_of(len(doubtful), len(motion), 'frame')} uncertain: {reason}")
+    if rough.max() > _CLEARLY_ROUGH:
+        position, rotation = rough
+        sentences.append(
+            f"self-check: from frame to frame positions scatter {position:.1f} times and rotations {rotation:.1f} "
+            "times as much as stated errors explain, so that their standard deviations are multiplied by that"
+        )
     wrong = None
     if not model.has_joints:
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
@@ -76,6 +90,18 @@ def check_run(
     lasting = None if found is None else found.lasting_at(motion.index)
     checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)
     return CheckedRun(checked, found, tuple(sentences), wrong)
+
+
+def _widen(motion: Motion, rough: Array) -> Motion:
+    """Multiply the errors of position and rotation by factors (2,); what is too wide then is uncertain."""
+    factors = np.repeat(rough, 3)
+    covariance = motion.covariance * np.outer(factors, factors)
+    variance = np.diagonal(covariance[:, :3, :3], axis1=1, axis2=2)
+    is_wide = (variance > UNCERTAIN_SD_M**2).any(axis=1) & (motion.status == Status.TRACKED.value)
+    status = np.where(is_wide, Status.UNCERTAIN.value, motion.status)
+    return replace(
+        motion, covariance=covariance, status=status, doubts=np.where(is_wide, Doubt.POSITION.value, motion.doubts)
+    )
 
 
 def alarms(findings: Sequence[Mapping[str, Any]]) -> list[str]:

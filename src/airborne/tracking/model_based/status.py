@@ -16,7 +16,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 
 _NEAR_PX = 12  # of a full frame: body-like pixels this close to the mask's bounding box count in the recall
 _FEWEST_PX = 20  # a smaller mask does not count as visible
-_UNCERTAIN_SD_M = 0.05  # of the root's position, above which an estimate is uncertain
+UNCERTAIN_SD_M = 0.05  # of the root's position, above which an estimate is uncertain
 _REFERENCE_RATE = 0.2  # weight of the newest frame in the running reference
 # shares of the reference's precision and recall, below which ...
 _SEARCH, _UNCERTAIN, _LOST = (0.95, 0.92), (0.85, 0.8), (0.5, 0.4)
@@ -97,7 +97,7 @@ def doubts_of(covariance: NDArray, agreement: MaskAgreement, reference: Referenc
     """Yield why a fit is uncertain, by the reference's agreement, and by its covariance, position [m] first."""
     if agreement.falls_short(reference, _UNCERTAIN if reference.is_learned else _UNCERTAIN_AT_FIRST):
         yield Doubt.IMAGES
-    if np.any(np.sqrt(np.diag(covariance)[:3]) > _UNCERTAIN_SD_M):
+    if np.any(np.sqrt(np.diag(covariance)[:3]) > UNCERTAIN_SD_M):
         yield Doubt.POSITION
     if agreement.misplaced and not reference.is_learned:
         yield Doubt.LIMBS

@@ -1,0 +1,57 @@
+"""A path that is rougher than its stated errors tells by how much; a smooth one and a fast one tell nothing."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from airborne.body import Pose
+from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.roughness import roughness
+
+POSITION_SD_M, ROTATION_SD_RAD = 0.002, 0.004
+N, RATE_HZ = 60, 50.0
+
+
+def path(position=1.0, rotation=1.0, *, seed=0, every=1, is_known=True):
+    """A thrown body that turns twice a second, with errors of these factors on the stated ones."""
+    rng, index = np.random.default_rng(seed), np.arange(0, N * every, every)
+    t = index / RATE_HZ / every
+    places = np.stack([2 * t, 0.3 * t, 1 + 4 * t - 9.81 / 2 * t**2], axis=1)
+    places += position * POSITION_SD_M * rng.standard_normal((N, 3))
+    turned = Rotation.from_rotvec(np.outer(4 * np.pi * t, [0.6, 0.0, 0.8]))
+    turned = Rotation.from_rotvec(rotation * ROTATION_SD_RAD * rng.standard_normal((N, 3))) * turned
+    poses = [Pose(world_from_root=RigidTransform.from_components(p, r)) for p, r in zip(places, turned, strict=True)]
+    variance = np.repeat([POSITION_SD_M, ROTATION_SD_RAD], 3) ** 2
+    covariance = np.tile(np.diag(variance if is_known else np.full(6, np.inf)), (N, 1, 1))
+    return TrackedPath(index, t, poses, covariance)
+
+
+EVERY = np.ones(N, bool)
+
+
+@pytest.mark.parametrize(("position", "rotation"), [(1, 1), (3, 1), (1, 5), (8, 8)])
+def test_the_factor_is_that_of_the_errors(position, rotation):
+    found = np.mean([roughness(path(position, rotation, seed=seed), EVERY) for seed in range(10)], axis=0)
+    assert found == pytest.approx([position, rotation], rel=0.25)
+
+
+def test_a_path_that_is_smoother_than_stated_leaves_the_errors_as_they_are():
+    assert roughness(path(0.0, 0.2), EVERY).tolist() == [1, 1]
+
+
+def test_errors_that_alternate_between_fields_are_seen():
+    smooth = path(0.0, 0.0)
+    shift_m, none = 5 * POSITION_SD_M * np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    poses = [pose.move(shift_m * (i % 2), none) for i, pose in enumerate(smooth.poses)]
+    position, rotation = roughness(TrackedPath(smooth.index, smooth.time_s, poses, smooth.covariance), EVERY)
+    assert position > 2 and rotation == 1
+
+
+@pytest.mark.parametrize("given", ["gaps", "untracked", "unknown", "few"])
+def test_where_nothing_can_be_compared_nothing_is_multiplied(given):
+    rough = path(5.0, 5.0, every=2 if given == "gaps" else 1, is_known=given != "unknown")
+    tracked = EVERY if given != "untracked" else np.arange(N) % 4 > 0
+    if given == "few":
+        rough = TrackedPath(rough.index[:6], rough.time_s[:6], rough.poses[:6], rough.covariance[:6])
+        tracked = EVERY[:6]
+    assert roughness(rough, tracked).tolist() == [1, 1]
