@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.appearance.background import BackgroundModel, BackgroundPixels
+from airborne.appearance.brightness import brightness_ratios, divide_brightness
 from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, posterior
 from airborne.cameras import Camera
 from airborne.video import View
@@ -97,6 +98,13 @@ class Appearance:
         """Return what is known of the background of a region."""
         background = self.backgrounds.get(region.source, BackgroundModel())
         return background.crop(region.corner, region.rgb.shape[:2])
+
+    def balance(self, region: Region) -> Region:
+        """Return a region as bright as its background was when that was learned, however it is exposed."""
+        if not self.has_background(region):
+            return region
+        ratios = brightness_ratios(region.rgb, self.background_pixels(region))
+        return region if ratios is None else replace(region, rgb=divide_brightness(region.rgb, ratios))
 
     def posterior(self, region: Region) -> NDArray[np.float32]:
         """Return each pixel's probability (h, w) to be body, at even odds."""

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.model import Region
+from airborne.appearance.model import Appearance, Region
 from airborne.body import PosedBody, SurfaceArrays
 from airborne.cameras import Camera
 from airborne.kernels import kernel
@@ -21,12 +21,20 @@ _ROUND_TO_PX = 8  # regions are whole multiples of the coarsest reduction
 
 
 def crop_regions(
-    bodies: Sequence[PosedBody], geometry: SurfaceArrays, frames: Frames, margin_px: float
+    bodies: Sequence[PosedBody],
+    geometry: SurfaceArrays,
+    frames: Frames,
+    margin_px: float,
+    appearance: Appearance | None = None,
 ) -> list[Region]:
-    """Cut out the part of every view that holds the posed bodies and a margin; views that show none are left out."""
+    """Cut out the part of every view that holds the posed bodies and a margin; views that show none are left out.
+
+    With an appearance, the regions are as bright as their backgrounds were when they were learned.
+    """
     points = np.concatenate([bounding_points(body, geometry) for body in bodies])
     regions = [_region(view, points, margin_px) for view in frames.views if view is not None]
-    return [region for region in regions if region is not None]
+    balance = (lambda region: region) if appearance is None else appearance.balance
+    return [balance(region) for region in regions if region is not None]
 
 
 def narrow_regions(

@@ -52,7 +52,8 @@ def search_globally(
     """
     bodies = [render_model.with_pose(guess) for guess in guesses]
     margin_px = min(2.5 * search_range.position_sd_m, _MOST_REGION_M) * _px_per_m(guesses[0], frames)
-    regions = [r for r in crop_regions(bodies, render_model.geometry, frames, margin_px) if appearance.has_colours(r)]
+    regions = crop_regions(bodies, render_model.geometry, frames, margin_px, appearance)
+    regions = [region for region in regions if appearance.has_colours(region)]
     if not regions:
         return list(guesses)
     maps = region_evidence(regions, [appearance.posterior(region) for region in regions])

@@ -52,7 +52,7 @@ def image_evidence(
     model, which differs from the one that is drawn in its surface at most.
     """
     posed, dofs = render_model.with_pose(pose), all_joints(model)
-    regions = crop_regions([posed], render_model.geometry, frames, MARGIN_PX)
+    regions = crop_regions([posed], render_model.geometry, frames, MARGIN_PX, appearance)
     regions = [region for region in regions if appearance.has_colours(region)]
     appearance = learn_missing_backgrounds(render_model, posed, regions, appearance)
     images = linearise_images(render_model, pose, regions, appearance, dofs=dofs)

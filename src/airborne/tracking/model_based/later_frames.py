@@ -21,7 +21,9 @@ MARGIN_PX = 32  # of a full frame
 def regions_near(fitter: Fitter, poses: Sequence[Pose], frames: Frames, appearance: Appearance) -> LearnedRegions:
     """Crop the images around a body in several poses."""
     bodies = [fitter.render_model.with_pose(pose) for pose in poses]
-    return LearnedRegions.of(crop_regions(bodies, fitter.render_model.geometry, frames, MARGIN_PX), appearance)
+    return LearnedRegions.of(
+        crop_regions(bodies, fitter.render_model.geometry, frames, MARGIN_PX, appearance), appearance
+    )
 
 
 def fit_next(

@@ -115,7 +115,7 @@ class RefinedTracker:
         if estimate.status is not Status.TRACKED and state.past:
             return replace(state, past=past, covariance=estimate.covariance)
         posed = self.render_model.with_pose(estimate.pose)
-        regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX)
+        regions = crop_regions([posed], self.render_model.geometry, frames, MARGIN_PX, state.appearance)
         motion = self._motion(before, frames)
         shares = estimate.mask_shares or self._mask_shares(estimate.pose, regions, state.appearance)  # rows have none
         is_steady = bool(state.past) and state.reference.is_met(shares, _STEADY)
