@@ -25,6 +25,7 @@ class BackgroundPixels(NamedTuple):
 
 
 _Tile = NDArray[np.float32]  # (h, w, 5): a pixel's mean (3), sd, number of observations, in one array to be copied fast
+_Slices = tuple[slice, slice]
 _UNKNOWN: _Tile = np.zeros((_TILE_PX, _TILE_PX, 5), np.float32)
 _UNKNOWN[..., 3] = START_SD
 
@@ -41,9 +42,14 @@ class BackgroundModel:
     def crop(self, corner: tuple[int, int], size: tuple[int, int]) -> BackgroundPixels:
         """Copy what is known of a region."""
         known = np.empty((*size, 5), np.float32)
-        for at, in_region, in_tile in _tiles_of(corner, size):
-            known[in_region] = self.tiles.get(at, _UNKNOWN)[in_tile]
+        for tile, in_region, in_tile in self.tiles_of(corner, size):
+            known[in_region] = tile[in_tile]
         return BackgroundPixels(known[..., :3], known[..., 3], known[..., 4])
+
+    def tiles_of(self, corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[_Tile, _Slices, _Slices]]:
+        """Yield the tiles that a region touches, and what they share, in the region and in the tile."""
+        for at, in_region, in_tile in _tiles_of(corner, size):
+            yield self.tiles.get(at, _UNKNOWN), in_region, in_tile
 
     def learn(self, rgb: NDArray[np.uint8], covered: NDArray[np.bool_], corner: tuple[int, int]) -> BackgroundModel:
         """Learn from a region's image rgb (h, w, 3); covered (h, w) where the body may be."""
@@ -52,9 +58,6 @@ class BackgroundModel:
             learned[at] = self.tiles.get(at, _UNKNOWN).copy()
             update_background(rgb[in_region], covered[in_region], learned[at][in_tile])
         return BackgroundModel(learned)
-
-
-_Slices = tuple[slice, slice]
 
 
 def _tiles_of(corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[tuple[int, int], _Slices, _Slices]]:

@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.background import BackgroundPixels
+from airborne.appearance.background import BackgroundModel
 from airborne.kernels import kernel
 from airborne.rendering.srgb import light_from_srgb, srgb_from_light
 from airborne.types import Array
 
-_SAMPLES = 2000  # pixels that are compared, about
-_FEWEST = 200  # of them; fewer tell nothing
+_SAMPLES = 1000  # pixels that are compared, about
+_FEWEST = 50  # of them; fewer tell nothing
 _DARK, _BRIGHT = 25, 235  # grey levels between which noise and clipping do not count
 _BIN, _N_BINS = 0.01, 301  # of the histograms of log ratios, about 1
 _ALIKE_BINS = 20  # on either side of the median; noise of three grey levels in sixty is 11 %
@@ -23,24 +23,18 @@ _LEAST_LOG = 0.04
 _LOG_LIGHT = np.log(np.maximum(light_from_srgb(np.arange(256.0)), 1e-4)).astype(np.float32)
 
 
-def brightness_ratios(rgb: NDArray[np.uint8], background: BackgroundPixels) -> Array | None:
+def brightness_ratios(rgb: NDArray[np.uint8], background: BackgroundModel, corner: tuple[int, int]) -> Array | None:
     """Return by how much brighter red, green and blue are than the background, in linear light: (3,).
 
-    rgb (h, w, 3). None where the image is as bright as it was, or too few pixels agree on how much it has changed.
+    rgb (h, w, 3) of the region whose first pixel is `corner` (x, y). None where the image is as bright as it was, or
+    too few pixels agree on how much it has changed.
     """
-    stride = max(1, int(np.sqrt(rgb.shape[0] * rgb.shape[1] / _SAMPLES)))
+    stride = max(1, int((rgb.shape[0] * rgb.shape[1] / _SAMPLES) ** 0.5))
     counts = np.zeros((3, _N_BINS), np.int32)
-    _count_ratios(rgb, background.mean, background.n_observations, stride, _LOG_LIGHT, counts)
-    ratios = np.zeros(3)
-    for k, each in enumerate(counts):
-        n = int(each.sum())
-        if n < _FEWEST:
-            return None
-        median = int(np.searchsorted(np.cumsum(each), n / 2))
-        if each[max(median - _ALIKE_BINS, 0) : median + _ALIKE_BINS + 1].sum() < _LEAST_SHARE * n:
-            return None
-        ratios[k] = (median - _N_BINS // 2) * _BIN
-    return np.exp(ratios) if np.abs(ratios).max() > _LEAST_LOG else None
+    for tile, in_region, in_tile in background.tiles_of(corner, rgb.shape[:2]):
+        _count_ratios(rgb[in_region], tile[in_tile], stride, _LOG_LIGHT, counts)
+    ratios = np.empty(3)
+    return np.exp(ratios) if _find_medians(counts, ratios) and np.abs(ratios).max() > _LEAST_LOG else None
 
 
 def divide_brightness(rgb: NDArray[np.uint8], ratios: Array) -> NDArray[np.uint8]:
@@ -51,17 +45,39 @@ def divide_brightness(rgb: NDArray[np.uint8], ratios: Array) -> NDArray[np.uint8
 
 
 @kernel
-def _count_ratios(rgb, mean, n_observations, stride, log_light, counts):
-    """Count the log ratios of every n-th pixel (h, w, 3) and its background's mean, in bins: counts (3, bins)."""
+def _count_ratios(rgb, known, stride, log_light, counts):
+    """Count the log ratios of every n-th pixel, rgb (h, w, 3), to its background, known (h, w, 5): counts (3, bins)."""
     h, w, _ = rgb.shape
-    for y in range(stride // 2, h, stride):
-        for x in range(stride // 2, w, stride):
-            if n_observations[y, x] <= 0:
+    middle = counts.shape[1] // 2
+    for y in range(0, h, stride):
+        for x in range(0, w, stride):
+            if known[y, x, 4] <= 0:
                 continue
             for k in range(3):
-                now, before = rgb[y, x, k], int(mean[y, x, k] + np.float32(0.5))
+                now, before = rgb[y, x, k], int(known[y, x, k] + np.float32(0.5))
                 if _DARK <= now <= _BRIGHT and _DARK <= before <= _BRIGHT:
-                    ratio = (log_light[now] - log_light[before]) / np.float32(_BIN)
-                    at = int(np.floor(ratio + np.float32(0.5))) + counts.shape[1] // 2
+                    at = int(np.floor((log_light[now] - log_light[before]) / _BIN + 0.5)) + middle
                     if 0 <= at < counts.shape[1]:
                         counts[k, at] += 1
+
+
+@kernel
+def _find_medians(counts, ratios):
+    """Fill ratios (3,) with the medians of counts (3, bins); return whether enough pixels are alike in each."""
+    for k in range(3):
+        n = 0
+        for count in counts[k]:
+            n += count
+        if n < _FEWEST:
+            return False
+        median, below = 0, counts[k, 0]
+        while 2 * below < n:
+            median += 1
+            below += counts[k, median]
+        alike = 0
+        for at in range(max(median - _ALIKE_BINS, 0), min(median + _ALIKE_BINS + 1, counts.shape[1])):
+            alike += counts[k, at]
+        if alike < _LEAST_SHARE * n:
+            return False
+        ratios[k] = (median - counts.shape[1] // 2) * _BIN
+    return True

@@ -103,7 +103,7 @@ class Appearance:
         """Return a region as bright as its background was when that was learned, however it is exposed."""
         if not self.has_background(region):
             return region
-        ratios = brightness_ratios(region.rgb, self.background_pixels(region))
+        ratios = brightness_ratios(region.rgb, self.backgrounds[region.source], region.corner)
         return region if ratios is None else replace(region, rgb=divide_brightness(region.rgb, ratios))
 
     def posterior(self, region: Region) -> NDArray[np.float32]:
