@@ -11,14 +11,14 @@ from airborne.kernels import kernel
 from airborne.rendering.srgb import light_from_srgb, srgb_from_light
 from airborne.types import Array
 
-_SAMPLES = 1000  # pixels that are compared, about
+_SAMPLES = 1000  # chosen: pixels that are compared, about; 2000 track the same frames of four synthetic throws
 _FEWEST = 50  # of them; fewer tell nothing
 _DARK, _BRIGHT = 25, 235  # grey levels between which noise and clipping do not count
 _BIN, _N_BINS = 0.01, 301  # of the histograms of log ratios, about 1
 _ALIKE_BINS = 20  # on either side of the median; noise of three grey levels in sixty is 11 %
 _LEAST_SHARE = 0.5  # of pixels that must agree: others are covered by something else
-# of a ratio, that is made good: less is followed by the background, as it learns. Chosen above the ratios of recordings
-# whose exposure stays, and below those at which pixels of the background (sd 2 grey levels at least) look like others
+# of a ratio that is made good, chosen: noise moves the median of so many pixels by less than 0.01, and the background,
+# as it learns, follows what is less
 _LEAST_LOG = 0.04
 _LOG_LIGHT = np.log(np.maximum(light_from_srgb(np.arange(256.0)), 1e-4)).astype(np.float32)
 
