@@ -35,7 +35,7 @@ _UNKNOWN_SIZE = (
 class CheckedRun:
     """A finished run after its self-check."""
 
-    motion: Motion  # with lasting errors, doubtful frames uncertain
+    motion: Motion  # with lasting errors and those of a rough path, doubtful frames uncertain
     found: SelfCheck | None  # None: too little to say anything
     doubts: tuple[str, ...]  # sentences
     fall: WrongFall | None = None  # of a body whose size does not explain it
@@ -63,9 +63,9 @@ def check_run(
     poses = [motion.pose(row) for row in rows]
     path = TrackedPath(motion.index[rows], motion.time_s[rows], poses, motion.covariance[rows, :6, :6])
     rough = np.ones(2) if model.has_joints else roughness(path, motion.status[rows] == Status.TRACKED.value)
-    if rough.max() > 1:  # never of people, who are smoothed with the whole run in view
-        motion = _widen(motion, rough)
-        path = replace(path, covariance=motion.covariance[rows])
+    excess = np.zeros((len(motion), 6, 6))
+    excess[rows] = _excess(path.covariance, rough)
+    path = replace(path, covariance=path.covariance + excess[rows])
     body_sd = PRESET_SD if is_preset else MEASURED_SD
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
@@ -75,6 +75,9 @@ def check_run(
         status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):
             sentences.append(f"self-check: {count_of(len(doubtful), len(motion), 'frame')} uncertain: {reason}")
+    is_wide = (np.diagonal(path.covariance[:, :3, :3], axis1=1, axis2=2) > UNCERTAIN_SD_M**2).any(axis=1)
+    wide = rows[is_wide & (status[rows] == Status.TRACKED.value) & (rough.max() > 1)]
+    status[wide], doubted[wide] = Status.UNCERTAIN.value, Doubt.POSITION.value
     if rough.max() > _CLEARLY_ROUGH:
         position, rotation = rough
         sentences.append(
@@ -88,20 +91,18 @@ def check_run(
         if wrong is None and len(rig) == 1 and found is not None and fall(*flight) is None:
             sentences.append(_UNKNOWN_SIZE)
     lasting = None if found is None else found.lasting_at(motion.index)
+    if rough.max() > 1:  # beside what the frames say themselves, which a run that is resumed keeps
+        lasting = excess if lasting is None else lasting + excess
     checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)
     return CheckedRun(checked, found, tuple(sentences), wrong)
 
 
-def _widen(motion: Motion, rough: Array) -> Motion:
-    """Multiply the errors of position and rotation by factors (2,); what is too wide then is uncertain."""
+def _excess(covariance: Array, rough: Array) -> Array:
+    """Return what factors (2,) on the errors of position and rotation add to covariances (n, 6, 6); 0 where unknown."""
     factors = np.repeat(rough, 3)
-    covariance = motion.covariance * np.outer(factors, factors)
-    variance = np.diagonal(covariance[:, :3, :3], axis1=1, axis2=2)
-    is_wide = (variance > UNCERTAIN_SD_M**2).any(axis=1) & (motion.status == Status.TRACKED.value)
-    status = np.where(is_wide, Status.UNCERTAIN.value, motion.status)
-    return replace(
-        motion, covariance=covariance, status=status, doubts=np.where(is_wide, Doubt.POSITION.value, motion.doubts)
-    )
+    more = np.outer(factors, factors) - 1
+    added = np.multiply(covariance, more, out=np.zeros_like(covariance), where=more > 0)
+    return np.where(np.isnan(added), 0.0, added)
 
 
 def alarms(findings: Sequence[Mapping[str, Any]]) -> list[str]:
