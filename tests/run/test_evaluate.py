@@ -78,6 +78,14 @@ def test_a_run_without_the_errors_that_its_self_check_found_to_last_is_refused(r
     assert assess(run, None, None, run.parent / "higher.csv")["joints"].whole.mean_mm == pytest.approx(10)
 
 
+def test_a_fall_alone_leaves_no_lasting_errors(run):
+    """Nobody misses a file that such a run never had."""
+    summary = (run / "summary.json").read_text()
+    finding = '"self_check": [{"subject": "fall", "sentence": "it falls too slowly", "is_alarm": true}]'
+    (run / "summary.json").write_text(summary.replace('"n_lost": 0', f'"n_lost": 0, {finding}'))
+    assert assess(run, None, None, run.parent / "higher.csv")["joints"].whole.mean_mm == pytest.approx(10)
+
+
 def test_a_truth_of_players_in_millimetres_is_asked_about(tmp_path, capsys):
     run, truth = write_run(tmp_path / "run"), write_truth(tmp_path / "truth.csv")
     lines = [line.split(",") for line in truth.read_text().splitlines()]

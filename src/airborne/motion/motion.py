@@ -38,9 +38,7 @@ class Motion:
     joint_angles: Array  # (n, joints, 3) x-y-z [rad]
     doubts: NDArray[np.str_]  # (n,) why frames are uncertain: values of `Doubt`, separated by slashes; "" for others
     uncertain_joints: NDArray[np.bool_]  # (n, joints) that may be elsewhere, whatever the covariance says
-    lasting: Array | None = (
-        None  # (n, 6, 6) of the root's errors that last, or make its path rough
-    )
+    lasting: Array | None = None  # (n, 6, 6) of the root's errors that last, or make its path rough
 
     @classmethod
     def collect(cls, estimates: Sequence[Estimate], joints: tuple[str, ...] = ()) -> Motion:

@@ -83,7 +83,8 @@ def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
     motion = read_motion(folder / MOTION)
     summary = _summary_if_finished(folder)
     _refuse_cut_table(folder / MOTION, len(motion), summary)
-    if motion.lasting is None and summary.get("self_check"):
+    lasting = [each for each in summary.get("self_check") or [] if each.get("subject") != "fall"]  # a fall adds nothing
+    if motion.lasting is None and lasting:
         raise ResultError(
             f"{folder / LASTING_FILE} is missing or cut, without which standard deviations are too small; copy it from "
             "the run, or track again"
