@@ -29,13 +29,14 @@ from airborne.body.symmetry import symmetries
 from airborne.evaluation.compare import compare_motion
 from airborne.evaluation.truth import read_truth
 from airborne.motion.files import read_motion
+from airborne.run.opening import video_source
 from airborne.run.track import track_trial
 from airborne.synthetic.throw.scene import cross_scene
 from airborne.synthetic.throw.writing import write_trial
 from airborne.trial.file import read_trial
 from airborne.types import Array
 from airborne.video import inspect
-from airborne.video.decoding import FieldOrder, VideoSource, decode, rgb_from_decoded
+from airborne.video.decoding import VideoSource, decode, rgb_from_decoded
 from airborne.video.writing import VideoWriter
 
 _SEEDS = (7201, 7202, 7203, 7204)
@@ -104,28 +105,25 @@ def _measure(right: Path, kind: str) -> tuple[float, ...]:
     """Return the shares of tracked frames, of their positions and rotations within two sds, and the RMS error [mm]."""
     folder = right.with_name(f"{right.name} {kind}")
     shutil.copytree(right, folder)
-    trial = read_trial(folder / "trial.toml")
-    for camera in trial.camera:
-        fields = "progressive" if camera.fields == "auto" else camera.fields
-        _degrade(right / camera.video, folder / camera.video, fields, kind)
+    whole, trial = (read_trial(each / "trial.toml") for each in (right, folder))
+    for camera in whole.camera:
+        _degrade(video_source(whole, camera), folder / camera.video, kind)
     track_trial(trial, folder / "run", pictures=False)
     motion = read_motion(folder / "run" / "motion.csv")
-    tracked = np.flatnonzero(motion.status == "tracked")
-    if not len(tracked):
+    is_tracked = motion.status == "tracked"
+    if not is_tracked.any():
         return 0.0, np.nan, np.nan, np.nan
-    is_tracked = (motion.status == "tracked")[:, None]
-    only = replace(motion, position=np.where(is_tracked, motion.position, np.nan))
+    only = replace(motion, position=np.where(is_tracked[:, None], motion.position, np.nan))
     compared = compare_motion(only, read_truth(folder / "truth.csv"), symmetries(trial.model()))
     shares = compared.position_calibration.within_2sd, compared.rotation_calibration.within_2sd
-    return len(tracked) / len(motion), *shares, compared.position.rms_3d_mm
+    return float(is_tracked.mean()), *shares, compared.position.rms_3d_mm
 
 
-def _degrade(source: Path, target: Path, fields: FieldOrder, kind: str) -> None:
-    change, crf = _KINDS[kind]
-    video = VideoSource(name=source.stem, path=source)
-    facts = inspect(video)
+def _degrade(video: VideoSource, target: Path, kind: str) -> None:
+    (change, crf), woven = _KINDS[kind], replace(video, fields="progressive")
+    facts, fields = inspect(woven), "progressive" if video.fields == "auto" else video.fields
     with VideoWriter(target, size=facts.size, rate=facts.image_rate, fields=fields, crf=crf) as writer:
-        for number, picture in enumerate(decode(video, facts)):
+        for number, picture in enumerate(decode(woven, facts)):
             image = change(rgb_from_decoded(picture, facts).astype(np.float32), number)
             writer.write(np.clip(image, 0, 255).astype(np.uint8))
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from airborne.body.legs import LEG_POINTS
 from airborne.motion.free_fall import PLAYER_NOISE
+from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.leg_track import LegTrack, extract_legs
 from airborne.motion.players import PlayersMotion
 
@@ -124,3 +125,9 @@ def noise(rng, shape, rate=60.0):
         slow[k] = keep * slow[k - 1] + np.sqrt(1 - keep**2) * steps[k]
     white = PLAYER_NOISE.white_share
     return np.sqrt(white) * rng.standard_normal(shape) + np.sqrt(1 - white) * slow
+
+
+def only(motion):
+    """Return the one jump of a motion."""
+    (jump,) = measure_jumps(motion)
+    return jump

@@ -33,8 +33,8 @@ def crop_regions(
     """
     points = np.concatenate([bounding_points(body, geometry) for body in bodies])
     regions = [_region(view, points, margin_px) for view in frames.views if view is not None]
-    balance = (lambda region: region) if appearance is None else appearance.balance
-    return [balance(region) for region in regions if region is not None]
+    known = [region for region in regions if region is not None]
+    return known if appearance is None else [appearance.balance(region) for region in known]
 
 
 def narrow_regions(

@@ -32,7 +32,7 @@ _MOST_SD_S = 0.03  # events with a larger standard deviation are not reported
 _NEAR_S = 0.06  # from an event, chosen: three frames of 60 images a second on either side
 _SLOWEST_FALL_M_S2 = -5.0  # about half of gravity: a body that falls more slowly is supported
 _LEAST_FALL_M_S2 = -1.0  # chosen: a jump filmed at three times the stated rate falls at 9.81 / 9
-_CLEAR_SDS = 4.0  # of an acceleration
+_CLEAR_SDS = 4.0  # chosen: of an acceleration, by which it may be steeper, or must be steep
 _ANKLE_RISE_M = {True: (0.09, 0.02), False: (0.06, 0.025)}  # at take-off, at landing: mean, standard deviation
 _FOREFOOT_RISE_M = {True: (0.02, 0.01), False: (0.012, 0.01)}  # the toes are the last to leave
 _STANDING_WINDOW_S, _STANDING_QUANTILE = 0.25, 0.2  # means over such windows; quantile of them that is standing
@@ -65,16 +65,20 @@ def standing_height(time_s: Array, height_m: Array) -> float:
 
 def find_flights(track: LegTrack) -> tuple[tuple[int, int], ...]:
     """Return the first and last row of each flight: both ankles high, and the body in free fall."""
-    return tuple(run for run in _airborne_runs(track) if _may_fall_freely(*fall_of(track, run)))
+    return tuple(run for run in _airborne_runs(track) if _may_fall_freely(*_acceleration(track, run)))
 
 
-def find_slow_falls(track: LegTrack) -> tuple[tuple[int, int], ...]:
-    """Return the first and last row of each time with both ankles high in which the body falls, yet slower than freely.
+def find_slow_falls(track: LegTrack) -> tuple[tuple[int, int, float], ...]:
+    """Return where both ankles are high and the body falls, yet slower than freely: first and last row, fall [m/s2].
 
     So falls a jump that was filmed at more images a second than its video says.
     """
-    found = [(run, *fall_of(track, run)) for run in _airborne_runs(track)]
-    return tuple(run for run, g, sd in found if not _may_fall_freely(g, sd) and g + _CLEAR_SDS * sd < _LEAST_FALL_M_S2)
+    slow = []
+    for first, last in _airborne_runs(track):
+        g, sd = _acceleration(track, (first, last))
+        if not _may_fall_freely(g, sd) and g + _CLEAR_SDS * sd < _LEAST_FALL_M_S2:
+            slow.append((first, last, -g))
+    return tuple(slow)
 
 
 def _airborne_runs(track: LegTrack) -> list[tuple[int, int]]:
@@ -165,7 +169,7 @@ def _belongs_to_run(track: LegTrack, smooth: Array, last: int, row: int) -> bool
     return bool(gap_s <= (_BRIDGE_S if is_gap else _DIP_S))
 
 
-def fall_of(track: LegTrack, rows: tuple[int, int]) -> tuple[float, float]:
+def _acceleration(track: LegTrack, rows: tuple[int, int]) -> tuple[float, float]:
     """Return the centre of mass's upward acceleration in a run of rows, and its sd [m/s2].
 
     NaN where fewer than five frames are known.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.constants import GRAVITY_M_S2
-from airborne.motion.jumps.events import FlightPosterior, fall_of, find_flights, find_slow_falls, sample_flight
+from airborne.motion.jumps.events import FlightPosterior, find_flights, find_slow_falls, sample_flight
 from airborne.motion.jumps.jump import UNKNOWN, Jump, Measurement
 from airborne.motion.jumps.leg_track import LegTrack, extract_legs
 from airborne.motion.jumps.standing_posture import measure_standing_posture
@@ -58,10 +58,10 @@ def describe_slow_falls(motion: PlayersMotion) -> list[str]:
     said = []
     for player in motion.players if motion.rate >= LEAST_RATE_HZ else ():
         track = extract_legs(motion, player)
-        for rows in find_slow_falls(track):
-            fall_m_s2, up_s = -fall_of(track, rows)[0], track.time_s[rows[1]] - track.time_s[rows[0]]
+        for first, last, fall_m_s2 in find_slow_falls(track):
+            up_s = track.time_s[last] - track.time_s[first]
             said.append(
-                f"{player}: from frame {track.index[rows[0]]} both feet are up for {up_s:.2f} s while the body falls "
+                f"{player}: from frame {track.index[first]} both feet are up for {up_s:.2f} s while the body falls "
                 f"at {fall_m_s2:.1f} m/s², not at {GRAVITY_M_S2:.2f}: this is no jump, or the stated frame rate is "
                 f"{np.sqrt(fall_m_s2 / GRAVITY_M_S2):.2f} of that at which it was filmed"
             )
