@@ -5,7 +5,8 @@ import pytest
 
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of
 from airborne.tracking.model_based.fitter import Fitter
-from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator, image_views
+from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator
+from airborne.tracking.model_based.image_views import image_views
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
 from airborne.tracking.model_based.uncovered import find_uncovered

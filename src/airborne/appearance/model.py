@@ -1,4 +1,4 @@
-"""What a tracker has learned from the images: the colours of body and background, and background models."""
+"""What a tracker has learned from the images: colours of body and background, background models, how sharp they are."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, post
 from airborne.cameras import Camera
 from airborne.video import View
 
+# sds of a lens's blur that are told apart: the widest is what the nine taps of the comparison's blur just hold
+LENS_BLURS_PX = (0.0, 0.5, 0.8, 1.2, 1.7, 2.5)
 _COLOUR_RATE = 0.1  # share of the newest frame in the colour histograms
 _SAMPLES = 2000  # pixels of a region that are counted, about
 _FEWEST = 30  # fewer pixels than this are not learned from
@@ -49,11 +51,13 @@ Histograms = Mapping[str, NDArray[np.float32]]  # camera name -> (32, 32, 32) pr
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Appearance:
-    """Colours and background models; a value: to learn is to return a new one."""
+    """Colours, background models and the blur of lenses; a value: to learn is to return a new one."""
 
     body_histograms: Histograms = field(default_factory=dict)
     background_histograms: Histograms = field(default_factory=dict)
     backgrounds: Mapping[tuple[str, bytes], BackgroundModel] = field(default_factory=dict)  # by source
+    # camera name -> (k,) what the images of the body have cost, drawn with each of LENS_BLURS_PX
+    blur_costs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def has_colours(self, region: Region) -> bool:
         """Whether this camera's colours have been learned."""
@@ -98,6 +102,16 @@ class Appearance:
         """Return what is known of the background of a region."""
         background = self.backgrounds.get(region.source, BackgroundModel())
         return background.crop(region.corner, region.rgb.shape[:2])
+
+    def learn_blur(self, region: Region, costs: NDArray[np.float64]) -> Appearance:
+        """Learn how sharp a camera's images are from what one costs with each of LENS_BLURS_PX: (k,)."""
+        name = region.camera.name
+        return replace(self, blur_costs={**self.blur_costs, name: self.blur_costs.get(name, 0.0) + costs})
+
+    def blur_px(self, region: Region) -> float:
+        """Return the sd of the blur of a camera's lens [px along a row]: 0 where nothing has been learned of it."""
+        costs = self.blur_costs.get(region.camera.name)
+        return 0.0 if costs is None else LENS_BLURS_PX[int(np.argmin(costs))]
 
     def balance(self, region: Region) -> Region:
         """Return a region as bright as its background was when that was learned, however it is exposed."""

@@ -17,7 +17,8 @@ import numpy as np
 from airborne.body import Pose, PosedBody
 from airborne.body.chain import delta_between, move_pose
 from airborne.tracking.image_regions import bounding_points
-from airborne.tracking.model_based.gauss_newton import Fit, ImageView, fit_images
+from airborne.tracking.model_based.gauss_newton import Fit, fit_images
+from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.kernel_arguments import Paint
 from airborne.tracking.model_based.normal_equations import light_by_lamps, light_fitted
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers

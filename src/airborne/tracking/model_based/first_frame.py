@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from airborne.appearance.foreground import body_like
 from airborne.appearance.model import Appearance, Region
@@ -12,6 +13,7 @@ from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit
 from airborne.tracking.model_based.gauss_newton import FAR
 from airborne.tracking.model_based.learned_regions import LearnedRegions
+from airborne.tracking.model_based.lens_blur import learn_blurs
 from airborne.video import Frames
 
 _MARGIN_PX = 56  # of a full frame
@@ -27,6 +29,10 @@ def fit_first(fitter: Fitter, start: Pose, frames: Frames, prior: PosePrior | No
         return None
     poses = [fitter.fit_silhouettes(pose, learned, FAR, prior) for pose in (start, *fitter.swap_limbs(start))]
     fit = fitter.fit_images([*poses, *fitter.swap_limbs(poses[0])], learned, prior)
+    if not fitter.moves_joints:
+        regions, known = learned.masks.regions, learned.appearance
+        learned = replace(learned, appearance=learn_blurs(render_model, fit.pose, regions, known))
+        fit = fitter.fit_images([fit.pose], learned, prior)
     return fitter.judge(fit, [start], learned, prior)
 
 

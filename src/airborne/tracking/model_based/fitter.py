@@ -23,12 +23,12 @@ from airborne.tracking.model_based.gauss_newton import (
     FAR,
     NEAR,
     Fit,
-    ImageView,
     PyramidLevels,
     fit_images,
     fit_silhouettes,
     image_evaluator,
 )
+from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import (

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
 from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
+from airborne.tracking.model_based.image_views import NOISE_PX, ImageView, image_views
 from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
 from airborne.tracking.model_based.normal_equations import (
     MASK,
@@ -27,8 +27,6 @@ from airborne.tracking.model_based.pose_descent import PoseEquations, descend_po
 from airborne.tracking.model_based.render_model import (
     RenderModel,
     ViewBuffers,
-    image_buffers,
-    shift_sds_px,
     silhouette_buffers,
 )
 from airborne.tracking.model_based.shape_error import shape_error_gradients, shape_error_px
@@ -43,10 +41,7 @@ FAR, NEAR, CLOSE = ((8, 5), (4, 4), (2, 3)), ((4, 2), (2, 2)), ((2, 1),)
 # images at half the size alone 9.4 and, after one iteration, 9.9 mm
 CLOSE_JOINTED = ((4, 1), (2, 2))
 _COARSE_SIGMA_PX = 1.2  # of the reduced image
-_FINE_SIGMA_PX = 1.2  # of a full frame
-_CLIP = 0.1  # linear light, 0..1: a residual this large has a quarter of the weight
-_CLIP_LIT = 0.5  # the same under known lights, where no shadow or highlight has to be left out
-_CLIP_MASK = 0.5  # the same, of a mask
+_CLIP_MASK = 0.5  # a residual of a mask this large has a quarter of the weight
 _PATCH = 8.0  # by this factor more pixels of a person are body, or not, together; chosen as `shape_error`'s width
 _OVERSTEP = 1.6  # robust weights and the refitted light make each step too short by about this factor
 # the same of a rigid body in unknown light, of its position and its rotation: least errors on seven throws
@@ -72,22 +67,6 @@ class Posteriors:
                 for region, plane in zip(self.regions, self.planes, strict=True)
             ]
         return self._reduced[reduction]
-
-
-class ImageView(NamedTuple):
-    """A view's image, prepared for the comparison with a body."""
-
-    buffers: ViewBuffers
-    comparison: Comparison
-    noise_px: float  # how many pixels share their noise
-    shift_sds_px: Array  # (3,) of `shift_sds_px`
-    exposure_s: float
-
-    def with_own_light(self) -> ImageView:
-        """Return the view with a light of its own, for a fit to change."""
-        light = self.buffers.light
-        own = light.copy() if isinstance(light, np.ndarray) else light
-        return self._replace(buffers=self.buffers._replace(light=own))
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,19 +170,6 @@ def linearise_images(
     return evaluate(pose, True)
 
 
-def image_views(render_model: RenderModel, regions: Sequence[Region], appearance: Appearance) -> list[ImageView]:
-    """Prepare the images of regions."""
-    clip = _CLIP if render_model.lights is None else _CLIP_LIT
-    views = []
-    for region in regions:
-        sigma_px = max(_FINE_SIGMA_PX * region.aspect, 0.5)  # along the columns
-        comparison = Comparison(gaussian_taps(_FINE_SIGMA_PX), gaussian_taps(sigma_px), clip)
-        buffers = image_buffers(render_model, region, appearance).prepare(comparison)
-        noise_px = 4 * np.pi * _FINE_SIGMA_PX * sigma_px
-        views.append(ImageView(buffers, comparison, noise_px, shift_sds_px(region), region.view.exposure_s))
-    return views
-
-
 def image_evaluator(
     render_model: RenderModel, poses: Sequence[Pose], views: Sequence[ImageView], *, dofs: DegreesOfFreedom
 ) -> tuple[Callable[[Pose, bool], PoseEquations], float]:
@@ -213,7 +179,7 @@ def image_evaluator(
     """
     bodies = [render_model.with_pose(pose) for pose in poses]
     empty_cost = sum(view.buffers.empty_cost for view in views)
-    correlated = float(np.mean([view.noise_px for view in views] or [4 * np.pi * _FINE_SIGMA_PX**2]))
+    correlated = float(np.mean([view.noise_px for view in views] or [NOISE_PX]))
     shape_px = [shape_error_px(view.buffers, bodies[0]) for view in views] if dofs.moves_joints else []
     shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
@@ -221,16 +187,15 @@ def image_evaluator(
         posed, n = render_model.with_pose(pose), len(render_model.model.segments)
         sums, totals, blocks, shifted = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), [], []
         noise_of_views = []
-        for view, comparison, noise_px, shift, _ in views:
+        for image in views:
             sums.B[:] = 0
-            blocks.append(_blocks(view, n))
-            iterations = 3 if is_first else 1
+            blocks.append(_blocks(image.buffers, n))
             of_view = _add_image_equations(
-                render_model, posed, view, comparison, iterations=iterations, sums=sums, blocks=blocks[-1]
+                render_model, posed, image, iterations=3 if is_first else 1, sums=sums, blocks=blocks[-1]
             )
             totals += of_view
-            noise_of_views.append(float(noise_px * of_view[1] / of_view[2]) if of_view[2] > 0 else 1.0)
-            shifted.append((sums.B * shift).transpose(2, 0, 1))
+            noise_of_views.append(float(image.noise_px * of_view[1] / of_view[2]) if of_view[2] > 0 else 1.0)
+            shifted.append((sums.B * image.shift_sds_px).transpose(2, 0, 1))
         if dofs.moves_joints:
             shifted.append(shape_error_gradients(sums.A))
         return map_to_dofs(
@@ -250,18 +215,19 @@ def image_evaluator(
     return evaluate, correlated
 
 
+def weigh_image(render_model: RenderModel, posed: PosedBody, image: ImageView) -> float:
+    """Return what an image costs with a body, less what it costs without; its light is fitted."""
+    n = len(posed.R)
+    sums, blocks = Sums.zero(n), _blocks(image.buffers, n)
+    return float(_add_image_equations(render_model, posed, image, iterations=3, sums=sums, blocks=blocks)[0])
+
+
 def _add_image_equations(
-    render_model: RenderModel,
-    posed: PosedBody,
-    view: ViewBuffers,
-    comparison: Comparison,
-    *,
-    iterations: int,
-    sums: Sums,
-    blocks: Array,
+    render_model: RenderModel, posed: PosedBody, image: ImageView, *, iterations: int, sums: Sums, blocks: Array
 ) -> Array:
     """Add one view's equations; return the cost, less an empty image's, the weighted squared residual, the weight."""
-    args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
+    view = image.buffers
+    args = render_model.body, view.projection(posed), view.observation, image.drawn, view.maps
     if render_model.lights is None:
         paint = Paint(render_model.albedo, render_model.is_faceted)
         return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))

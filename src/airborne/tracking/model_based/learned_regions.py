@@ -10,13 +10,14 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import PosedBody
 from airborne.rendering import EvidenceMaps
 from airborne.tracking.image_regions import narrow_regions
-from airborne.tracking.model_based.gauss_newton import ImageView, Posteriors, image_views
+from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.global_search import region_evidence
+from airborne.tracking.model_based.image_views import ImageView, image_views
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
-_MARGIN_PX = 12  # of a full frame: the blur's radius, and how far images move a body beyond its silhouettes
+MARGIN_PX = 12  # of a full frame: the blur's radius, and how far images move a body beyond its silhouettes
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class LearnedRegions:
         appearance = learn_missing_backgrounds(render_model, bodies[0], regions, self.appearance)
         if are_narrow:
             return image_views(
-                render_model, narrow_regions(regions, bodies, render_model.geometry, _MARGIN_PX), appearance
+                render_model, narrow_regions(regions, bodies, render_model.geometry, MARGIN_PX), appearance
             )
         if appearance not in self.prepared:
             self.prepared[appearance] = image_views(render_model, regions, appearance)

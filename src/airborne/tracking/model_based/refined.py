@@ -28,6 +28,7 @@ from airborne.tracking.model_based.image_evidence import ImageEvidence, image_ev
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
+from airborne.tracking.model_based.lens_blur import learn_blurs
 from airborne.tracking.model_based.recovery import is_same, recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, doubts_of, is_lost
@@ -40,6 +41,7 @@ _HISTORY = 3  # poses that predict
 # share of the reference's precision and recall from which colours and backgrounds are learned in turns; if they always
 # are, light that doubles within twelve frames is lost
 _STEADY = 0.98
+_BLUR_FRAMES = 2  # that tell how sharp the images are: on synthetic throws four tell no more, the first alone less
 _LEAST_IN_VIEW = 0.4  # of the body, in the view that shows most of it; with less, the estimate is uncertain
 
 PREDICTIONS: dict[str, tuple[Callable[[predictors.PoseHistory, Fraction], Pose], ...]] = {
@@ -129,6 +131,8 @@ class RefinedTracker:
             colours=turn == 1 or not is_steady,
             backgrounds=turn == 0 or not is_steady,
         )
+        if state.n_learned < _BLUR_FRAMES and not self.moves_joints:
+            appearance = learn_blurs(self.render_model, estimate.pose, regions, appearance, motion)
         if not state.past:  # nothing was known of colours before
             shares = self._mask_shares(estimate.pose, regions, appearance)
         reference = state.reference.update(*shares) if shares else state.reference
