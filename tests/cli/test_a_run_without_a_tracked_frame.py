@@ -12,9 +12,9 @@ SUMMARY = {
 def test_it_is_said_before_any_number(tmp_path):
     lines = _describe(SUMMARY, tmp_path).splitlines()
     assert lines[0] == "5 frames at 4 Hz: 0 tracked, 3 uncertain, 2 lost"
-    why = "images and pose agree less than in the frames before (2), much of the body is out of the pictures (1)"
+    why = "images and pose agree too little (2), much of the body is out of the pictures (1)"
     assert lines[1] == f"uncertain: {why}"
-    assert lines[2] == "no frame was tracked, so none of these numbers can be relied on: see the notes"
+    assert lines[2] == "no frame was tracked, so none of these numbers can be relied on"
     single = {"n_frames": 1, "n_uncertain": 1, "n_lost": 0, "doubts": {"position": 1}}
     one = _describe({**SUMMARY, **single}, tmp_path).splitlines()
     assert one[2] == "one frame does not show what else looks like the body, so that it is often uncertain"

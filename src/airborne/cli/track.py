@@ -156,10 +156,8 @@ def _track(
 def _describe_self_check(summary: dict) -> str | None:
     """Say what the self-check found; alarms are among the notes."""
     findings = summary.get("self_check")
-    if findings is None or summary["n_frames"] in (summary["n_lost"], 1):
+    if not findings or summary["n_frames"] in (summary["n_lost"], 1):
         return None
-    if not findings:
-        return "self-check: the scene is never seen without the body, so nothing can be said; film a moment without it"
     if any(each["is_alarm"] for each in findings):
         return "self-check: something is wrong, see the notes"
     if not summary["n_tracked"]:
@@ -208,7 +206,7 @@ def _describe(summary: dict, output: Path) -> str:
             said = "one frame does not show what else looks like the body, so that it is often uncertain"
             lines.append(f"{said}: {look}, where every outline must lie on the body" if look else said)
         elif not summary["n_tracked"]:
-            lines.append("no frame was tracked, so none of these numbers can be relied on: see the notes")
+            lines.append("no frame was tracked, so none of these numbers can be relied on")
         else:
             position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
             lines.append(

@@ -18,7 +18,7 @@ from airborne.tracking import Doubt, Status
 from airborne.types import Array
 
 _REASONS = {
-    Doubt.IMAGES: "images and pose agree less than in the frames before",
+    Doubt.IMAGES: "images and pose agree too little",
     Doubt.POSITION: "a position has an sd over 50 mm",
     Doubt.VIEW: "much of the body is out of the pictures",
     Doubt.LIMBS: "limbs may be misplaced, and nothing of the recording was learned before",
@@ -81,6 +81,8 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
         yield "The body was found in no frame: this run measured nothing."
     elif head["n_lost"]:
         yield f"{count_of(head['n_lost'], n, 'frame')} lost; they hold no numbers."
+    if n > 1 and n_posed and not head["n_tracked"]:
+        yield "No frame was tracked: none of these numbers can be relied on."
     if head["n_uncertain"]:
         why = f": {describe_doubts(head)}" if head["doubts"] else ""
         uncertain = count_of(head["n_uncertain"], n, "frame")

@@ -83,8 +83,7 @@ def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
     motion = read_motion(folder / MOTION)
     summary = _summary_if_finished(folder)
     _refuse_cut_table(folder / MOTION, len(motion), summary)
-    lasting = [each for each in summary.get("self_check") or [] if each.get("subject") != "fall"]  # a fall adds nothing
-    if motion.lasting is None and lasting:
+    if motion.lasting is None and summary.get("has_lasting_errors"):
         raise ResultError(
             f"{folder / LASTING_FILE} is missing or cut, without which standard deviations are too small; copy it from "
             "the run, or track again"

@@ -256,6 +256,7 @@ class BodyRun:
             **({} if measured.joint_statuses is None else {"joint_statuses": measured.joint_statuses}),
             **({} if measured.flight is None else {"flight": flight_summary(motion, measured.flight).to_dict()}),
             **({} if fitted is None else {"whole_run": fitted.surface}),
+            "has_lasting_errors": motion.lasting is not None,
             "self_check": [*([] if flight is None else [flight.to_dict()]), *checked.findings],
             "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
             "timings_s": timings_s,

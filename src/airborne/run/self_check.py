@@ -15,11 +15,11 @@ from airborne.motion import Motion
 from airborne.tracking import Doubt, Status
 from airborne.tracking.model_based.status import UNCERTAIN_SD_M
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
-from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong_rate
+from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong_flight
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.self_check.nuisances import MEASURED_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
-from airborne.tracking.self_check.roughness import roughness
+from airborne.tracking.self_check.roughness import PathFinding, find_wrong_path, roughness
 from airborne.types import Array
 
 # of the sizes of body and world, chosen: at a rate 10 % too low those of a throw were 23.2 and 23.4 %
@@ -29,6 +29,7 @@ _UNKNOWN_SIZE = (
     "self-check: to one camera only a free fall shows how large a body is, and none was measured: "
     "distances are as right as the sizes in the body's file"
 )
+_NEVER_EMPTY = "self-check: the scene is never seen without the body, so nothing can be said; film a moment without it"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,13 +39,13 @@ class CheckedRun:
     motion: Motion  # with lasting errors and those of a rough path, doubtful frames uncertain
     found: SelfCheck | None  # None: too little to say anything
     doubts: tuple[str, ...]  # sentences
-    fall: WrongFall | None = None  # of a body whose size does not explain it
+    wrong: Sequence[WrongFall | PathFinding] = ()  # of a thing, what no size, camera or clock explains
 
     @property
     def findings(self) -> list[dict[str, Any]]:
         """What summary.json holds."""
         causes = () if self.found is None else self.found.diagnosis.findings
-        return [finding.to_dict() for finding in (self.fall, *causes) if finding is not None]
+        return [finding.to_dict() for finding in (*self.wrong, *causes)]
 
 
 def check_run(
@@ -65,12 +66,25 @@ def check_run(
     rough = np.ones(2) if model.has_joints else roughness(path, motion.status[rows] == Status.TRACKED.value)
     excess = np.zeros((len(motion), 6, 6))
     excess[rows] = _excess(path.covariance, rough)
+    of_path = None if model.has_joints else find_wrong_path(path, rough)
     path = replace(path, covariance=path.covariance + excess[rows])
     body_sd = PRESET_SD if is_preset else MEASURED_SD
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
     status, doubted, sentences = motion.status.astype(object), motion.doubts.astype(object), []
-    for reason, is_doubtful in doubts(model, path, frames, first.index, found).items():
+    wrong: list[WrongFall | PathFinding] = []
+    reasons = doubts(model, path, frames, first.index, found)
+    if not model.has_joints:
+        flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
+        of_flight = find_wrong_flight(*flight)
+        wrong = [each for each in (of_path, of_flight) if each is not None]
+        if of_flight is None and len(rig) == 1 and found is not None and fall(*flight) is None:
+            sentences.append(_UNKNOWN_SIZE)
+        if of_path is not None:
+            reasons = {**reasons, "the pictures are not one after another": np.ones(len(rows), bool)}
+    if found is None and len(motion) > 1:
+        sentences.append(_NEVER_EMPTY)
+    for reason, is_doubtful in reasons.items():
         doubtful = rows[is_doubtful & (motion.status[rows] == Status.TRACKED.value)]
         status[doubtful], doubted[doubtful] = Status.UNCERTAIN.value, Doubt.SELF_CHECK.value
         if len(doubtful):
@@ -78,18 +92,12 @@ def check_run(
     is_wide = (np.diagonal(path.covariance[:, :3, :3], axis1=1, axis2=2) > UNCERTAIN_SD_M**2).any(axis=1)
     wide = rows[is_wide & (status[rows] == Status.TRACKED.value) & (rough.max() > 1)]
     status[wide], doubted[wide] = Status.UNCERTAIN.value, Doubt.POSITION.value
-    if rough.max() > _CLEARLY_ROUGH:
+    if rough.max() > _CLEARLY_ROUGH and (of_path is None or of_path.kind != "roughness"):
         position, rotation = rough
         sentences.append(
             f"self-check: from frame to frame positions scatter {position:.1f} times and rotations {rotation:.1f} "
             "times as much as stated errors explain, so that their standard deviations are multiplied by that"
         )
-    wrong = None
-    if not model.has_joints:
-        flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
-        wrong = find_wrong_rate(*flight)
-        if wrong is None and len(rig) == 1 and found is not None and fall(*flight) is None:
-            sentences.append(_UNKNOWN_SIZE)
     lasting = None if found is None else found.lasting_at(motion.index)
     if rough.max() > 1:  # beside what the frames say themselves, which a run that is resumed keeps
         lasting = excess if lasting is None else lasting + excess

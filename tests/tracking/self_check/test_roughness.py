@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.tracking.self_check.path import TrackedPath
-from airborne.tracking.self_check.roughness import roughness
+from airborne.tracking.self_check.roughness import find_wrong_path, roughness
 
 POSITION_SD_M, ROTATION_SD_RAD = 0.002, 0.004
 N, RATE_HZ = 60, 50.0
@@ -55,3 +55,31 @@ def test_where_nothing_can_be_compared_nothing_is_multiplied(given):
         rough = TrackedPath(rough.index[:6], rough.time_s[:6], rough.poses[:6], rough.covariance[:6])
         tracked = EVERY[:6]
     assert roughness(rough, tracked).tolist() == [1, 1]
+
+
+def repeated(every, smooth):
+    """The path with one of so many poses repeated, at the next one's time."""
+    poses = [smooth.poses[i - 1 if i % every == 1 else i] for i in range(N)]
+    return TrackedPath(smooth.index, smooth.time_s, poses, smooth.covariance)
+
+
+@pytest.mark.parametrize(("every", "share"), [(2, 0.5), (5, 0.2)])
+def test_repeated_pictures_are_named_with_their_share(every, share):
+    found = find_wrong_path(repeated(every, path(0.1, 0.1)), np.ones(2))
+    assert found is not None and found.kind == "repeated" and found.to_dict()["is_alarm"]
+    assert found.value == pytest.approx(share, abs=0.03)
+
+
+def test_a_thing_that_rests_or_bounces_repeats_nothing():
+    smooth = path(0.1, 0.1)
+    times, covariance = (smooth.index, smooth.time_s), smooth.covariance
+    rests = TrackedPath(*times, [smooth.poses[max(i - 30, 0)] for i in range(N)], covariance)
+    bounces = TrackedPath(*times, [smooth.poses[abs(i - 30)] for i in range(N)], covariance)
+    assert find_wrong_path(rests, np.ones(2)) is None and find_wrong_path(bounces, np.ones(2)) is None
+    assert find_wrong_path(smooth, np.ones(2)) is None
+
+
+def test_a_far_too_rough_path_is_an_alarm():
+    found = find_wrong_path(path(0.1, 0.1), np.array([2.0, 6.0]))
+    assert found is not None and "rotations 6.0 times" in found.sentence
+    assert find_wrong_path(path(0.1, 0.1), np.array([3.3, 1.0])) is None

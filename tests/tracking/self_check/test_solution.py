@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.tracking.self_check.free_flight import fall, find_wrong_rate
+from airborne.tracking.self_check.free_flight import fall, find_wrong_flight
 from airborne.tracking.self_check.solution import Evidence, pose_errors, solve
 from tests.support.tolerances import SOLVED
 
@@ -105,13 +105,29 @@ def test_a_fall_is_measured_across_a_direction_that_one_camera_hardly_sees():
 
 @pytest.mark.parametrize(("rate", "said"), [(25, None), (22, None), (12.5, "2.5 m/s²"), (50, "39.2 m/s²"), (3, None)])
 def test_a_fall_that_no_size_explains_tells_of_a_wrong_rate(rate, said):
-    found = find_wrong_rate(*thrown(40, rate), known(40))
+    found = find_wrong_flight(*thrown(40, rate), known(40))
     assert (found is None) == (said is None)
     if found is not None:
         assert said in found.sentence and f"{rate / 25:.2f} of that" in found.sentence
         assert found.gravity_m_s2 == pytest.approx(9.81 * (rate / 25) ** 2, rel=0.01) and found.to_dict()["is_alarm"]
 
 
+@pytest.mark.parametrize("up", ["x", "y"])
+def test_a_fall_along_another_axis_than_z_is_named(up):
+    time_s, position, R = thrown(40, 25)
+    world = np.roll(np.eye(3), "xyz".index(up) + 1, axis=0)  # z becomes it
+    turned = time_s, position @ world.T, world @ R
+    found = find_wrong_flight(*turned, known(40))
+    assert found is not None and f"towards −{up}, 90° from straight down" in found.sentence
+    assert fall(*turned, known(40)) is None
+
+
+def test_a_world_upside_down_is_named():
+    time_s, position, R = thrown(40, 25)
+    found = find_wrong_flight(time_s, -position, R, known(40))
+    assert found is not None and "towards +z, 180°" in found.sentence
+
+
 def test_a_body_at_rest_does_not_fall():
-    assert find_wrong_rate(np.arange(40) / 25, np.zeros((40, 3)), np.tile(np.eye(3), (40, 1, 1)), known(40)) is None
+    assert find_wrong_flight(np.arange(40) / 25, np.zeros((40, 3)), np.tile(np.eye(3), (40, 1, 1)), known(40)) is None
     assert fall(np.arange(12) / 25, np.zeros((12, 3)), np.tile(np.eye(3), (12, 1, 1)), known(12)) is None

@@ -1,4 +1,4 @@
-"""The fall of a body in free flight as a measurement of the world's size: it must be 9.81 m/s2, downward."""
+"""The fall of a body in free flight as a measurement of the world's size and axes: 9.81 m/s2, downward."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ _LEAST_M_S2, _MOST_M_S2 = 6.0, 15.0  # a fall that a wrong scale can explain
 # chosen: a fall that a wrong frame rate explains, half and twice the right one, and its least length, as hands
 # lead a thing on a short parabola, too
 _SLOWEST_M_S2, _FASTEST_M_S2, _LONG_S = 2.0, 45.0, 0.5
+_MOST_OFF = 0.1  # chosen: from gravity's size, of a fall in a wrong direction; a hand hardly leads a thing so
 _LEAST_SD_M_S2 = 0.03  # air, and a centre of mass that is not quite where it is taken to be
 
 
@@ -39,6 +40,20 @@ class WrongFall(NamedTuple):
         }
 
 
+class _Parabola(NamedTuple):
+    """A path of constant acceleration, as bodies fly."""
+
+    weights: Array  # (3 n,) of the positions in the vertical acceleration
+    acceleration: Array  # (3,) [m/s2]
+    sd_m_s2: float  # of the vertical one, by the residuals
+
+    @property
+    def is_vertical(self) -> bool:
+        """Whether it falls along the world's z axis, downward."""
+        x, y, z = self.acceleration
+        return z < 0 and np.hypot(x, y) < _MOST_TILT * -z
+
+
 def fall(time_s: Array, position: Array, R: Array, covariance: Array) -> tuple[Array, float, float] | None:
     """Measure the vertical acceleration of a body that turns freely; None where it is not in free flight.
 
@@ -47,33 +62,50 @@ def fall(time_s: Array, position: Array, R: Array, covariance: Array) -> tuple[A
     the weights (3 n,) of the positions in the acceleration, it itself and its sd [m/s2].
     """
     found = _parabola(time_s, position, R, covariance)
-    if found is None:
+    if found is None or not found.is_vertical or not _LEAST_M_S2 < -found.acceleration[2] < _MOST_M_S2:
         return None
-    weights, acceleration, sd = found
-    if not _LEAST_M_S2 < -acceleration < _MOST_M_S2:
-        return None
-    return weights, acceleration, float(np.hypot(_LEAST_SD_M_S2, 2 * sd))
+    return found.weights, float(found.acceleration[2]), float(np.hypot(_LEAST_SD_M_S2, 2 * found.sd_m_s2))
 
 
-def find_wrong_rate(time_s: Array, position: Array, R: Array, covariance: Array) -> WrongFall | None:
-    """Find a body that falls so slowly or fast that no wrong size explains it; None where it does not, or briefly.
+def find_wrong_flight(time_s: Array, position: Array, R: Array, covariance: Array) -> WrongFall | None:
+    """Find a body that falls so slowly or fast that no wrong size explains it, or not downward; None where it does not.
 
-    The arrays are those of `fall`.
+    The arrays are those of `fall`. Short flights do not count.
     """
     found = _parabola(time_s, position, R, covariance) if len(time_s) and np.ptp(time_s) >= _LONG_S else None
-    if found is None or not _SLOWEST_M_S2 < -found[1] < _FASTEST_M_S2 or _LEAST_M_S2 < -found[1] < _MOST_M_S2:
+    if found is None:
         return None
-    share = float(np.sqrt(-found[1] / GRAVITY_M_S2))
+    if not found.is_vertical:
+        return _wrong_vertical(found)
+    falls = float(-found.acceleration[2])
+    if not _SLOWEST_M_S2 < falls < _FASTEST_M_S2 or _LEAST_M_S2 < falls < _MOST_M_S2:
+        return None
     return WrongFall(
-        -found[1],
-        found[2],
-        f"the body falls at {-found[1]:.1f} m/s² instead of {GRAVITY_M_S2:.2f}: the stated frame rate seems to be "
-        f"{share:.2f} of that at which it was filmed",
+        falls,
+        found.sd_m_s2,
+        f"the body falls at {falls:.1f} m/s² instead of {GRAVITY_M_S2:.2f}: the stated frame rate seems to be "
+        f"{np.sqrt(falls / GRAVITY_M_S2):.2f} of that at which it was filmed",
     )
 
 
-def _parabola(time_s: Array, position: Array, R: Array, covariance: Array) -> tuple[Array, float, float] | None:
-    """Return the weights of the positions in the vertical acceleration, it itself and its sd by residuals; as `fall`.
+def _wrong_vertical(found: _Parabola) -> WrongFall | None:
+    """Find a fall at about 9.81 m/s2 that is not along the world's z axis: what looks like no flight may be one."""
+    size = float(np.linalg.norm(found.acceleration))
+    if abs(size / GRAVITY_M_S2 - 1) > _MOST_OFF:
+        return None
+    axis = int(np.argmax(np.abs(found.acceleration)))
+    sign = "+" if found.acceleration[axis] > 0 else "−"
+    off_deg = np.degrees(np.arccos(np.clip(-found.acceleration[2] / size, -1.0, 1.0)))
+    return WrongFall(
+        size,
+        found.sd_m_s2,
+        f"the body falls at {size:.1f} m/s² towards {sign}{'xyz'[axis]}, {off_deg:.0f}° from straight down: the z axis "
+        "of the world must point up; give the control points their heights as z, and calibrate again",
+    )
+
+
+def _parabola(time_s: Array, position: Array, R: Array, covariance: Array) -> _Parabola | None:
+    """Fit free flight in any direction to the arrays of `fall`; None where the path is none.
 
     The residual that tells free flight weighs directions as the fit does; where all have equal noise it is the RMS.
     """
@@ -90,10 +122,10 @@ def _parabola(time_s: Array, position: Array, R: Array, covariance: Array) -> tu
     solution = inverse @ whitened
     residual = whitened - design @ solution
     noise = float(np.sqrt(residual @ residual / max(3 * n - 12, 1)))  # in units of the covariances
-    g, rms = solution[6:9], noise * np.sqrt(3 * n / np.sum(whiten**2))
-    is_parabola = -g[2] > 0 and np.hypot(g[0], g[1]) < _MOST_TILT * -g[2] and rms < _MOST_RMS_M
+    if noise * np.sqrt(3 * n / np.sum(whiten**2)) >= _MOST_RMS_M:
+        return None
     weights = (inverse[8].reshape(n, 1, 3) @ whiten).ravel()
-    return (weights, float(g[2]), noise * float(np.linalg.norm(inverse[8]))) if is_parabola else None
+    return _Parabola(weights, solution[6:9], noise * float(np.linalg.norm(inverse[8])))
 
 
 def excess(acceleration: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
@@ -17,7 +19,66 @@ from airborne.types import Array
 # deviations, where 90 and 84 % did; of the throws as they were no deviation changes
 _WINDOWS = ((2, 2), (3, 3))
 _FEWEST = 5  # chosen: windows from which a factor is estimated
+_FAR_TOO_ROUGH = 4.0  # chosen: the throws above have up to 3.3, one of pictures blended from two 5.2
+# of a step over the mean of those beside, chosen: a thing's speed does not fall to a seventh and back within three
+# frames; and how many such steps count, as it may bounce
+_REPEATED, _FEWEST_REPEATED, _LEAST_SHARE = 0.15, 4, 0.1
+_LEAST_STEP_SDS = 4.0  # chosen: of those beside, so that they are seen
 _MEDIAN_SQUARE = chi2_quantile(0.5, 1)  # of normal errors in standard deviations
+
+
+class PathFinding(NamedTuple):
+    """What a path tells of the pictures: they cannot be one after another at the stated rate."""
+
+    kind: str
+    value: float
+    sentence: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what `self_check` in summary.json holds: an alarm."""
+        return {
+            "subject": "path",
+            "kind": self.kind,
+            "value": self.value,
+            "sd": 0.0,
+            "is_alarm": True,
+            "sentence": self.sentence,
+        }
+
+
+def find_wrong_path(path: TrackedPath, rough: Array) -> PathFinding | None:
+    """Find a thing that moves by jerks; `rough` (2,) is its `roughness`, by which its deviations are multiplied."""
+    share = _repeated_share(path)
+    if share:
+        return PathFinding(
+            "repeated",
+            share,
+            f"{share:.0%} of the pictures show what the one before showed: the videos were filmed at a lower rate and "
+            "filled up by repeating; drop the repeated pictures (where it is every second, track with --every 2)",
+        )
+    if rough.max() < _FAR_TOO_ROUGH:
+        return None
+    return PathFinding(
+        "roughness",
+        float(rough.max()),
+        f"from frame to frame positions scatter {rough[0]:.1f} times and rotations {rough[1]:.1f} times as much as "
+        "stated errors explain, so that their standard deviations are multiplied by that: look in the videos for "
+        "pictures that are blended from two, lost or out of order",
+    )
+
+
+def _repeated_share(path: TrackedPath) -> float:
+    """Return the share of steps that hardly are any, between two that are; 0 where they are few."""
+    if len(path.index) < 4:
+        return 0.0
+    steps = np.linalg.norm(np.diff(path.positions, axis=0), axis=1)
+    variance = np.trace(path.covariance[:, :3, :3], axis1=1, axis2=2)
+    beside = (steps[:-2] + steps[2:]) / 2
+    is_gapless = path.index[3:] - path.index[:-3] == 3 * np.median(np.diff(path.index))
+    is_seen = beside > _LEAST_STEP_SDS * np.sqrt(variance[1:-2])
+    is_repeated = is_gapless & is_seen & (steps[1:-1] < _REPEATED * beside)
+    n, share = np.count_nonzero(is_repeated), float(is_repeated.mean())
+    return share if n >= _FEWEST_REPEATED and share >= _LEAST_SHARE else 0.0
 
 
 def roughness(path: TrackedPath, is_tracked: NDArray[np.bool_]) -> Array:
