@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from airborne.cameras import Rig, camera_looking_at, read_rig
 from airborne.errors import VideoError
 from airborne.sync import offsets_by_motion
-from airborne.sync.silhouettes import Silhouettes, silhouettes_of, smooth_at, solve_shifts
+from airborne.sync.silhouettes import Silhouettes, refuse_lost_images, silhouettes_of, smooth_at, solve_shifts
 from airborne.video import VideoSource
 from tests.support.clips import numbered, plain_rig, write_clip
 from tests.support.places import THROWN_CROSS
@@ -56,6 +56,20 @@ def test_errors_lie_within_the_stated_sds():
         offset_s, sd_s = solve_shifts(views, 0.1)
         misses += list((offset_s - late_s)[1:] / sd_s[1:])
     assert 0.5 < np.sqrt(np.mean(np.square(misses))) < 1.7
+
+
+@pytest.mark.parametrize("n_lost", [0, 1, 3])
+def test_a_video_that_lacks_images_in_the_middle_is_named(n_lost):
+    views = [silhouettes_at(camera, 0.0, noise=0.002, seed=i) for i, camera in enumerate(RIG)]
+    kept = [k for k in range(40) if not 14 <= k < 14 + n_lost]
+    times, hulls = views[1].time_s[: len(kept)], tuple(views[1].hulls[k] for k in kept)
+    views[1] = replace(views[1], time_s=times, hulls=hulls)
+    offset_s, _ = solve_shifts(views, 0.3)
+    if n_lost < 2:
+        refuse_lost_images(views, offset_s)
+        return
+    with pytest.raises(VideoError, match=rf"cam1: before 0\.\d+ s or so, .* {n_lost} images earlier than after it"):
+        refuse_lost_images(views, offset_s)
 
 
 @pytest.fixture(scope="module")
