@@ -80,8 +80,8 @@ def check_run(
         wrong = [each for each in (of_path, of_flight) if each is not None]
         if of_flight is None and len(rig) == 1 and found is not None and fall(*flight) is None:
             sentences.append(_UNKNOWN_SIZE)
-        if of_path is not None:
-            reasons = {**reasons, "the pictures are not one after another": np.ones(len(rows), bool)}
+        if of_path is not None and of_path.kind == "repeated":
+            reasons = {**reasons, "pictures show the moment of the one before": np.ones(len(rows), bool)}
     if found is None and len(motion) > 1:
         sentences.append(_NEVER_EMPTY)
     for reason, is_doubtful in reasons.items():

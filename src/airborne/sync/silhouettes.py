@@ -162,7 +162,7 @@ def refuse_lost_images(silhouettes: Sequence[Silhouettes], offset_s: Array) -> N
                 raise VideoError(
                     f"{own.camera.name}: {when} {middle_s:.2f} s or so, its motion fits the other cameras' "
                     f"{count(abs(n_lost), 'image')} {'later' if n_lost > 0 else 'earlier'} than {other} it: images seem "
-                    "to be missing in the middle of a video; export the videos again with all images and their times"
+                    "to be missing in the middle of a video; export it again with all its images and their times"
                 )
 
 

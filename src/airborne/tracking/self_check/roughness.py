@@ -19,7 +19,9 @@ from airborne.types import Array
 # deviations, where 90 and 84 % did; of the throws as they were no deviation changes
 _WINDOWS = ((2, 2), (3, 3))
 _FEWEST = 5  # chosen: windows from which a factor is estimated
-_FAR_TOO_ROUGH = 4.0  # chosen: the throws above have up to 3.3, one of pictures blended from two 5.2
+# chosen: throws whose pictures are bad have up to 3.3, one of pictures blended from two 5.2, one of cameras that shake
+# by whole fields more; those of the latter hold 95 % within two deviations nevertheless
+_FAR_TOO_ROUGH = 4.0
 # of a step over the mean of those beside, chosen: a thing's speed does not fall to a seventh and back within three
 # frames; and how many such steps count, as it may bounce
 _REPEATED, _FEWEST_REPEATED, _LEAST_SHARE = 0.15, 4, 0.1
@@ -63,7 +65,7 @@ def find_wrong_path(path: TrackedPath, rough: Array) -> PathFinding | None:
         float(rough.max()),
         f"from frame to frame positions scatter {rough[0]:.1f} times and rotations {rough[1]:.1f} times as much as "
         "stated errors explain, so that their standard deviations are multiplied by that: look in the videos for "
-        "pictures that are blended from two, lost or out of order",
+        "pictures that are blended from two, lost or out of order, and for cameras that shake",
     )
 
 
