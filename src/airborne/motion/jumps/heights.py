@@ -9,7 +9,7 @@ from airborne.constants import GRAVITY_M_S2
 from airborne.motion.jumps.events import FlightPosterior, find_flights, find_slow_falls, sample_flight
 from airborne.motion.jumps.jump import UNKNOWN, Jump, Measurement, are_legs_lost
 from airborne.motion.jumps.leg_track import LegTrack, extract_legs
-from airborne.motion.jumps.standing_posture import measure_standing_posture
+from airborne.motion.jumps.standing_posture import NEAR_S, measure_standing_posture
 from airborne.motion.local_polynomials import N_DRAWS, local_fits, peak_draws
 from airborne.motion.players import PlayersMotion
 from airborne.types import Array
@@ -21,7 +21,6 @@ _HIPS_ACCELERATION_PRIOR = (-GRAVITY_M_S2, 3.0, 30.0)  # at the peak: mean and s
 _FEET_ACCELERATION_PRIOR = (-GRAVITY_M_S2, 6.0, 100.0)  # the same of feet, which also turn about the knees
 _BEFORE_S = 0.3  # of take-off: speeds are sought from there
 _UNTRACKED_LIMBS_M_S = 0.05  # sd of the body's speed due to arms and trunk, a tenth and half of the mass
-_NEAR_S = 5.0  # of the flight: where a standing posture is sought
 # [1/s] frames from which jumps are measured: the least at which blocks were tried. At 20 a second a foot of the
 # recorded block jump is 1 m off, and at 15 a flight of a synthetic one 0.14 s too short
 LEAST_RATE_HZ = 29.0
@@ -47,7 +46,7 @@ def measure_jumps(motion: PlayersMotion, *, block_level_m: float = _BLOCK_LEVEL_
         for number, rows in enumerate(flights, 1):
             rng = np.random.default_rng((_SEED, number))
             middle = (track.time_s[rows[0]] + track.time_s[rows[1]]) / 2
-            near = floor & (np.abs(track.time_s - middle) <= _NEAR_S)
+            near = floor & (np.abs(track.time_s - middle) <= NEAR_S)
             flight = sample_flight(rng, track, rows, near)
             jumps.append(_measure_jump(rng, track, flight, near, number=number, block_level_m=block_level_m))
     return tuple(jumps)
