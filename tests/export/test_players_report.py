@@ -1,5 +1,7 @@
 """The report of a run of players: jumps to quote with their intervals, and nothing where nothing is known."""
 
+from html import unescape
+
 import numpy as np
 
 from airborne.export.page import UNKNOWN_TEXT
@@ -50,7 +52,7 @@ def test_a_height_that_nobody_saw_is_unknown_and_it_is_said_why(tmp_path):
     why = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
     assert note == f"  how high the hips rose is not known: {why}"
     page = write_players_report(tmp_path, summary_of([row]), motion).read_text()
-    assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"<td>how high the hips rose is not known: {why}</td>" in page
+    assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"one, jump 1: how high the hips rose is not known: {why}</li>" in page
 
 
 def test_uncertain_ankles_do_not_speak_against_the_height_of_hips_that_are_tracked():
@@ -97,7 +99,9 @@ def test_what_speaks_against_a_run_is_said_beside_its_numbers_and_in_the_same_wo
     of_player = [f"one: {line.strip()}" for line in (uncertain, few, untracked, unseen)]
     assert warnings == [*of_player, f"one, jump 1: {noisy.strip()}"]
     page = write_players_report(tmp_path, {**summary, "warnings": warnings}, motion).read_text(encoding="utf-8")
-    assert f"<td>{noisy.strip()}</td>" in page and f"{warnings[-1]}</li>" in page
+    first, tables = unescape(page).split("<h2>Jumps</h2>")
+    assert all(f"{each}</li>" in first for each in warnings)  # to be read first
+    assert f"{warnings[-1]}</li>" in tables  # below the row
 
 
 def test_its_viewer_shows_one_frame_in_a_browser(tmp_path):

@@ -15,9 +15,19 @@ _PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or 
 
 
 def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what `player_notes` and `jump_notes` say of a summary, each with its player or jump; of a body nothing."""
+    """Yield what speaks against the players and jumps of a summary; of a body nothing."""
+    yield from notes_of_players(summary)
+    yield from notes_of_jumps(summary)
+
+
+def notes_of_players(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield `player_notes` of all players, each with its name."""
     for name, player in summary.get("players", {}).items():
         yield from (f"{name}: {note}" for note in player_notes(player, summary["n_frames"]))
+
+
+def notes_of_jumps(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield `jump_notes` of all jumps, each with its name."""
     for jump in summary.get("jumps", ()):
         yield from (f"{jump['player']}, jump {jump['jump']}: {note}" for note in jump_notes(jump))
 

@@ -12,7 +12,14 @@ from matplotlib.figure import Figure
 from airborne.export import panels
 from airborne.export.page import UNKNOWN_TEXT, render_report
 from airborne.export.palette import STATUS_RGB, hex_colour
-from airborne.export.players_notes import drop_notes, is_known, jump_notes, player_notes
+from airborne.export.players_notes import (
+    drop_notes,
+    is_known,
+    jump_notes,
+    notes_of_jumps,
+    notes_of_players,
+    player_notes,
+)
 from airborne.export.report import DEFINITIONS
 from airborne.export.summary import json_ready
 from airborne.export.viewer import players_viewer
@@ -72,12 +79,13 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
         fine_text="Every player was tracked in every frame.",
         definitions={**_DEFINITIONS, "Uncertainty": uncertainty},
         players=[_player_record(name, player) for name, player in summary["players"].items()],
+        notes_of_players=list(notes_of_players(summary)),
         jumps=[_jump_record(row) for row in summary["jumps"]],
         heights_to_quote=[
             (_interval_cm(row, "hips"), f"{row['player']}, jump {row['jump']}: hips") for row in summary["jumps"]
         ],
         viewer=players_viewer(folder, motion),
-        jumps_caption=_JUMPS_CAPTION,
+        notes_of_jumps=[*notes_of_jumps(summary), _JUMPS_CAPTION],
         heights=figures_of(folder) / HEIGHTS_FIGURE,
         heights_caption=_FIGURE_CAPTION,
     )
@@ -104,8 +112,8 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _player_record(name: str, player: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the report shows of a player."""
-    return {"player": name, **player, "doubts": "; ".join(player.get("doubts", ()))}
+    """Return what the report's table shows of a player; doubts stand below it."""
+    return {"player": name, **{key: value for key, value in player.items() if key != "doubts"}}
 
 
 def _jump_record(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -116,7 +124,6 @@ def _jump_record(row: Mapping[str, Any]) -> dict[str, Any]:
         "status": row["status"],
         **{name: _with_interval(row, *quantity) for name, quantity in _JUMP_QUANTITIES.items()},
         "uncertain frames": row["n_uncertain"],
-        "notes": "; ".join(jump_notes(row)),
     }
 
 
