@@ -26,7 +26,7 @@ from airborne.export.figures import (
     write_joints_figure,
     write_pose,
 )
-from airborne.motion import JointStatus, joint_statuses, landmarks
+from airborne.motion import JointStatus, joint_angles, joint_statuses, landmarks
 from airborne.motion.joints import doubtful_segments, main_joints
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 from tests.support.tolerances import ROUNDTRIP
@@ -186,15 +186,20 @@ def test_an_unobservable_joint_is_marked(tmp_path):
     assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
 
 
-def test_an_angle_is_uncertain_where_one_of_its_segments_is_not_tracked():
+def test_an_angle_is_uncertain_where_a_segment_of_it_is_not_tracked_and_unknown_where_no_image_shows_it():
     motion = person_run(unseen=(5,))
+    motion = replace(motion, uncertain_joints=np.zeros((len(motion), len(motion.joints)), bool))
+    motion.uncertain_joints[2, motion.joints.index("shank_left")] = True
     shown = joints_figure(motion, PERSON)
     said = [text.get_text() for text in shown.legends[0].get_texts()]
     doubtful = doubtful_segments(motion, PERSON)
-    at = [PERSON.index_of(segment) for segment, *_ in main_joints(motion.joints)]
+    segments = [segment for segment, *_ in main_joints(motion.joints)]
+    at = [PERSON.index_of(segment) for segment in segments]
     n = sum(int(doubtful[:, [k, PERSON.parents[k]]].any(axis=1).sum()) for k in at)
-    assert 0 < n < 8 * len(motion)
-    assert f"tracked ({8 * len(motion) - n})" in said and f"uncertain ({n})" in said
+    n_unknown = int(np.isinf(joint_angles(motion, PERSON)["angle_sd"].sel(axis="x", joint=segments)).sum())
+    assert 0 < n_unknown < n < 8 * len(motion)
+    assert f"tracked ({8 * len(motion) - n})" in said and f"uncertain ({n - n_unknown})" in said
+    assert f"unknown, in no image ({n_unknown})" in said  # hatched, and without a marker
 
 
 def test_the_status_of_each_joint_is_drawn_over_the_whole_run():

@@ -1,8 +1,11 @@
 """The report of a run of players: jumps to quote with their intervals, and nothing where nothing is known."""
 
+from html import unescape
+
 import numpy as np
 
 from airborne.export.page import UNKNOWN_TEXT
+from airborne.export.players_notes import jump_notes, players_warnings
 from airborne.export.players_report import players_summary, write_players_report
 from airborne.motion import measure_jumps
 from airborne.motion.jumps.table import jump_row
@@ -40,16 +43,37 @@ def test_a_jump_is_quoted_by_its_hips_with_its_interval_and_other_heights_follow
     assert f"{1000 * flight.value:.0f} ({1000 * flight.low:.0f} to {1000 * flight.high:.0f})" in page
 
 
-def test_a_height_that_nobody_saw_is_unknown_and_uncertain_frames_are_said(tmp_path):
+def test_a_height_that_nobody_saw_is_unknown_and_it_is_said_why(tmp_path):
     motion = jumping.motion_of(jumping.Jumper())
     (jump,) = measure_jumps(motion)
-    row = {**jump_row(jump), "hip_height_m": np.nan, "n_uncertain": 4}
-    _, first, _ = players_summary(summary_of([row]))
+    row = {**jump_row(jump), "hip_height_m": np.nan}
+    _, first, _, note = players_summary(summary_of([row]))
+    assert first == f"one, jump 1: {UNKNOWN_TEXT}, hips over standing (95 % interval)"
     why = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
-    assert first.startswith(f"one, jump 1: how high the hips rose is not known ({why})")
-    assert first.endswith("; 4 of its frames are uncertain")
+    assert note == f"  how high the hips rose is not known: {why}"
     page = write_players_report(tmp_path, summary_of([row]), motion).read_text()
-    assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"how high the hips rose is not known: {why}." in page
+    assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"one, jump 1: how high the hips rose is not known: {why}</li>" in page
+
+
+def test_uncertain_ankles_do_not_speak_against_the_height_of_hips_that_are_tracked():
+    row = jump_row(measure_jumps(jumping.motion_of(jumping.Jumper()))[0])
+    assert list(jump_notes(row)) == []
+    (of_ankles,) = jump_notes({**row, "n_uncertain": 26})
+    assert of_ankles.startswith("knees or ankles are uncertain in 26 of its frames, hips in none")
+    (of_hips,) = jump_notes({**row, "n_uncertain": 26, "n_hips_uncertain": 3})
+    assert of_hips == "hips are uncertain in 3 of its frames: look at them before use"
+
+
+def test_standing_that_was_not_seen_is_said_with_what_to_film():
+    row = jump_row(measure_jumps(jumping.motion_of(jumping.Jumper()))[0])
+    (note,) = jump_notes({**row, "standing_source": "lengths"})
+    assert note.startswith("standing was not seen") and "film 0.25 s of standing upright and still within 5 s" in note
+
+
+def test_legs_that_went_astray_are_said_beside_the_height_that_they_cost():
+    row = jump_row(measure_jumps(jumping.motion_of(jumping.Jumper()))[0])
+    _, note = jump_notes({**row, "noise_scale": 10.3, "tuck_m": 0.67, "foot_height_m": np.nan})
+    assert note.startswith("its feet rose 0.67 m more than its hips") and "withheld" in note
 
 
 def test_a_run_without_a_jump_says_so_and_one_of_a_single_frame_does_not():
@@ -58,16 +82,26 @@ def test_a_run_without_a_jump_says_so_and_one_of_a_single_frame_does_not():
     assert len(list(players_summary({**summary, "n_frames": 1}))) == 1
 
 
-def test_what_speaks_against_a_run_is_said_beside_its_numbers():
-    (jump,) = measure_jumps(jumping.motion_of(jumping.Jumper()))
+def test_what_speaks_against_a_run_is_said_beside_its_numbers_and_in_the_same_words_among_its_warnings(tmp_path):
+    motion = jumping.motion_of(jumping.Jumper())
+    (jump,) = measure_jumps(motion)
     summary = summary_of([{**jump_row(jump), "noise_scale": 9.0}])
-    summary["players"] = {
-        "one": {**COUNTS, "n_tracked": 0, "n_uncertain": 150, "n_below_two_cameras": 90, "n_fewer_cameras": 90}
-    }
-    _, untracked, unseen, _, noisy, _ = players_summary(summary)
-    assert untracked == "  no frame of one was tracked, so none of these numbers can be relied on"
-    assert unseen.startswith("  in most frames fewer than two cameras agree on one: are videos exchanged")
+    doubts = ["ankles and feet in frames 29 to 55: sd over 6 cm"]
+    few = {"n_below_two_cameras": 90, "n_fewer_cameras": 90, "doubts": doubts}
+    summary["players"] = {"one": {**COUNTS, "n_tracked": 0, "n_uncertain": 150, **few}}
+    _, uncertain, few, untracked, unseen, _, _, noisy = players_summary(summary)
+    assert uncertain == "  uncertain are ankles and feet in frames 29 to 55: sd over 6 cm; look at them before use"
+    assert few == "  90 of 150 frames rest on fewer than two cameras, so that depth is a guess"
+    assert untracked == "  no frame was tracked, so none of these numbers can be relied on"
+    assert unseen.startswith("  in most frames fewer than two cameras agree: are videos exchanged")
     assert noisy.startswith("  its flight differs from a fall at 9.81 m/s² 3.0 times as much as stated errors explain")
+    warnings = list(players_warnings(summary))
+    of_player = [f"one: {line.strip()}" for line in (uncertain, few, untracked, unseen)]
+    assert warnings == [*of_player, f"one, jump 1: {noisy.strip()}"]
+    page = write_players_report(tmp_path, {**summary, "warnings": warnings}, motion).read_text(encoding="utf-8")
+    first, tables = unescape(page).split("<h2>Jumps</h2>")
+    assert all(f"{each}</li>" in first for each in warnings)  # to be read first
+    assert f"{warnings[-1]}</li>" in tables  # below the row
 
 
 def test_its_viewer_shows_one_frame_in_a_browser(tmp_path):

@@ -17,3 +17,10 @@ def test_a_body_and_a_world_that_are_wrong_alike_tell_of_the_frame_rate(body, wo
     assert found[:2] == ["self-check: the body ...", "self-check: the world ..."]
     assert found[2:] == ([] if said is None else [f"self-check: a frame rate {said} would explain both"])
     assert len(alarms([finding("body", body), finding("world", world, is_alarm=False)])) == 1
+
+
+def test_a_camera_whose_time_is_wrong_comes_with_its_remedy_and_one_that_may_be_right_with_none():
+    late = {**finding("cam3", 0.05), "kind": "time_s", "sentence": "camera cam3 seems 50.2 ± 8.4 ms late"}
+    (said,) = alarms([late])
+    assert said == "self-check: camera cam3 seems 50.2 ± 8.4 ms late: run `airborne sync`, then track again"
+    assert alarms([{**late, "is_alarm": False}]) == []

@@ -23,6 +23,8 @@ from tests.support.players_trial import write_run
 from tests.support.takes import tumbling
 
 UNFINISHED = "the run is not finished: these are the frames so far; `airborne track --resume` goes on"
+MARKED = "status in .csv, sd as residual in .c3d, unmarked in .trc, .mot, .bvh and .glb"
+UNCERTAIN = f"number_7: 18 of 72 points are uncertain: {MARKED}"
 SUFFIXES = ["c3d", "trc", "mot", "osim", "glb", "bvh", "csv", "parquet"]
 
 
@@ -155,7 +157,7 @@ def test_without_pyarrow_parquet_is_left_out_and_refused_where_asked_for(players
     exported = export_run(players_run, tmp_path)
     assert "block.parquet" not in names(exported) and "block.csv" in names(exported)
     advice = "Parquet needs pyarrow, which is not installed: pip install pyarrow"
-    assert exported.notes == (f"left out parquet. {advice}",)
+    assert exported.notes == (UNCERTAIN, f"left out parquet. {advice}")
     with pytest.raises(ResultError, match=re.escape(advice)):
         export_run(players_run, tmp_path, ["csv", "parquet"])
 
@@ -183,9 +185,10 @@ def run_command(monkeypatch, *arguments):
 def test_the_command_lists_its_files(players_run, tmp_path, monkeypatch, capsys):
     assert run_command(monkeypatch, "export", players_run, "-o", tmp_path, "--trc", "--osim") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines == [str(tmp_path / f"block_{who}.{kind}") for kind in ("trc", "osim") for who in ("Anna", "number_7")]
+    files = [str(tmp_path / f"block_{who}.{kind}") for kind in ("trc", "osim") for who in ("Anna", "number_7")]
+    assert lines == [*files, f"note: {UNCERTAIN}"]
     assert run_command(monkeypatch, "export", players_run, "-o", tmp_path, "--gltf", "--json") == 0
-    assert json.loads(capsys.readouterr().out) == {"files": [str(tmp_path / "block.glb")], "notes": []}
+    assert json.loads(capsys.readouterr().out) == {"files": [str(tmp_path / "block.glb")], "notes": [UNCERTAIN]}
 
 
 def test_every_format_has_its_option(players_run, tmp_path, monkeypatch):

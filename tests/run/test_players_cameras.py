@@ -43,8 +43,8 @@ def test_right_times_are_not_accused():
 )
 def test_the_camera_that_is_a_frame_off_is_named(ahead, camera, direction):
     (said,) = described(ahead)
-    assert said.startswith(f"self-check: {camera} shows the players ")
-    assert said.endswith(f" ms or more {direction} than its times say; `airborne sync` finds by how much")
+    assert said.startswith(f"self-check: {camera} shows the players {direction} than its times say")
+    assert "`airborne sync`" in said and " ms" not in said  # tracking hides most of it, so no size is named
 
 
 @pytest.mark.parametrize("i", [0, 2])

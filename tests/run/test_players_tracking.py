@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from airborne.cameras import read_rig
+from airborne.cli.track import _describe
 from airborne.errors import AirborneError, ResultError, TrialError
 from airborne.motion import read_players
 from airborne.motion.players import PLAYERS_COLUMNS
@@ -75,9 +76,13 @@ def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     assert (summary["rate_hz"], summary["start_s"], summary["duration_s"]) == (50, 0, 0.22)
     assert summary["players"]["Anna"] == {
         **{"n_tracked": 12, "n_uncertain": 0, "n_lost": 0, "n_fewer_cameras": 0, "n_below_two_cameras": 0},
-        **{"median_sd_mm": pytest.approx(1e3 * np.sqrt(3e-4)), "median_score": -5.5},
+        **{"median_sd_mm": pytest.approx(1e3 * np.sqrt(3e-4)), "median_score": -5.5, "doubts": []},
     }
     assert summary["players"]["number 7"]["n_uncertain"] == 3
+    (doubt,) = summary["players"]["number 7"]["doubts"]
+    said = f"number 7: uncertain are {doubt}; look at them before use"
+    assert said in summary["warnings"]
+    assert _describe(summary, tmp_path / "run").count(doubt) == 1
     assert summary["bystanders"] == [BYSTANDER]
     assert summary["events"] == []
     assert set(summary["inputs"]) == {"left.mkv", "right.mkv", "calib.toml", "start and lights"}
@@ -98,7 +103,7 @@ def test_videos_and_report_are_written_on_request(path, tmp_path):
     track_trial(read_trial(path, {"overlay": "broadcast"}), tmp_path / "run")
     assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
     report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
-    assert "number 7: 3 of 12 frames are uncertain" in report
+    assert "number 7: uncertain are all joints in " in report
     assert report.count("<img") == 1 and "http:" not in report.split("<style>")[0]
 
 
@@ -276,4 +281,4 @@ def test_a_run_in_which_everybody_is_lost_says_so_and_exits_with_one(path, tmp_p
     monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Lost())
     assert in_process("track", path, "-o", tmp_path / "run") == 1
     assert "Anna: 0 tracked, 0 uncertain, 12 lost; median sd of a joint not known" in capsys.readouterr().out
-    assert "Anna was found in no frame" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "Anna: found in no frame" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")

@@ -189,9 +189,12 @@ def _describe(summary: dict, output: Path) -> str:
     drawn = [path.relative_to(output).as_posix() for path in _overlays(output)]
     look = f"look at the first frame in {', '.join(drawn)}" if drawn else ""
     look_and = f"{look} and " if look else ""
+    said_above: list[str] = []
     if "players" in summary:
+        from airborne.export.players_notes import players_warnings
         from airborne.export.players_report import players_summary
 
+        said_above = list(players_warnings(summary))
         lines += players_summary(summary)
         if n == summary["n_lost"]:
             lines.append(f"no player was found in any frame: {look_and}correct [[start.player]]")
@@ -215,7 +218,8 @@ def _describe(summary: dict, output: Path) -> str:
             )
     if (line := _describe_self_check(summary)) is not None:
         lines.append(line)
-    lines += [f"note: {text}" for text in [*summary["warnings"], *summary["events"]]]
+    notes = [text for text in summary["warnings"] if text not in said_above]
+    lines += [f"note: {text}" for text in [*notes, *summary["events"]]]
     return "\n".join(lines)
 
 

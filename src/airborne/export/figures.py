@@ -117,17 +117,17 @@ def write_joints_figure(path: Path, motion: Motion, model: BodyModel) -> None:
 def joints_figure(motion: Motion, model: BodyModel) -> Figure:
     """Draw the angles of the main joints over time [deg], left beside right, with bands of two standard deviations.
 
-    Where the images do not show an angle, it is left out; where either of its segments is not tracked, the angle is
-    uncertain. Of a person shoulders, elbows, hips and knees: the x angle,
-    flexion positive. Of another body the x angles of its first joints.
+    Where the images do not show an angle, it is unknown: left out, and counted for itself. Where either of its
+    segments is not tracked, it is uncertain. Of a person shoulders, elbows, hips and knees: the x angle, flexion
+    positive. Of another body the x angles of its first joints.
 
     Raises ResultError where the motion is another body's.
     """
     table, joint_panels = joint_angles(motion, model), main_joints(motion.joints)
     if not joint_panels:
         raise ResultError("this body has no joints, so there are no angles of joints to draw")
-    unobservable, singular = np.zeros((2, len(motion)), bool)
-    doubtful, statuses = doubtful_segments(motion, model), []
+    doubtful, singular = doubtful_segments(motion, model), np.zeros(len(motion), bool)
+    statuses, unknown = [], []
     figure, grid = panels.panel_figure(-(-len(joint_panels) // 2), 2, row_in=1.6)
     cells = [axes for row in grid for axes in row]
     for axes, (segment, label, sign) in zip(cells, joint_panels, strict=False):
@@ -138,20 +138,22 @@ def joints_figure(motion: Motion, model: BodyModel) -> Figure:
         panels.draw_band(axes, motion.time_s, sign * values, sd)
         at = model.index_of(segment)
         is_doubtful = doubtful[:, [at, model.parents[at]]].any(axis=1) & motion.has_pose
-        statuses.append(np.where(is_doubtful, Status.UNCERTAIN.value, motion.status))
-        panels.draw_estimate(axes, motion, sign * values, statuses[-1])
+        status = np.where(is_doubtful, Status.UNCERTAIN.value, motion.status)
+        statuses.append(status[~is_unobservable])
+        unknown.append(is_unobservable)
+        panels.draw_estimate(axes, motion, sign * values, status)
         panels.shade_spans(axes, motion.time_s, is_unobservable, panels.UNOBSERVABLE_STYLE)
         panels.shade_spans(axes, motion.time_s, is_singular, panels.SINGULAR_STYLE)
         panels.label_panel(axes, f"{label} [°]")
-        unobservable, singular = unobservable | is_unobservable, singular | is_singular
+        singular |= is_singular
     for axes in cells[len(joint_panels) :]:
         axes.set_axis_off()
     handles = [
-        *panels.unobservable_handles(unobservable),
+        *panels.unobservable_handles(np.array(unknown), f"unknown, in no image ({np.sum(unknown)})"),
         *panels.singular_handles(singular, "y near ±90°: x and z mix"),
     ]
     return panels.draw_legend(
-        figure, [*panels.status_handles(np.array(statuses)), panels.band_handle(_TWO_SD), *handles]
+        figure, [*panels.status_handles(np.concatenate(statuses)), panels.band_handle(_TWO_SD), *handles]
     )
 
 

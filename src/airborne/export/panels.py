@@ -129,13 +129,11 @@ def band_handle(label: str) -> Patch:
     return Patch(**_BAND_STYLE, label=label)
 
 
-def unobservable_handles(unobservable: Mask) -> list[Patch]:
+def unobservable_handles(
+    unobservable: Mask, label: str = "a direction cannot be seen (infinite deviation)"
+) -> list[Patch]:
     """Return the legend entry of the intervals shaded as unobservable, if any."""
-    return (
-        [Patch(**UNOBSERVABLE_STYLE, label="a direction cannot be seen (infinite deviation)")]
-        if unobservable.any()
-        else []
-    )
+    return [Patch(**UNOBSERVABLE_STYLE, label=label)] if unobservable.any() else []
 
 
 def singular_handles(singular: Mask, label: str = "tilt near ±90°: somersault and twist mix") -> list[Patch]:

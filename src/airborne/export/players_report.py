@@ -9,10 +9,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from airborne.errors import count_of
 from airborne.export import panels
 from airborne.export.page import UNKNOWN_TEXT, render_report
 from airborne.export.palette import STATUS_RGB, hex_colour
+from airborne.export.players_notes import (
+    drop_notes,
+    is_known,
+    jump_notes,
+    notes_of_jumps,
+    notes_of_players,
+    player_notes,
+)
 from airborne.export.report import DEFINITIONS
 from airborne.export.summary import json_ready
 from airborne.export.viewer import players_viewer
@@ -26,10 +33,6 @@ HEIGHTS_FIGURE = "heights.png"
 _JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
-# of the variances, chosen: errors in flight twice those stated; block_jump has 1, with a clock 0.1 s off 2, at a wrong
-# frame rate 8, with exchanged videos 12
-_NOISY = 4.0
-
 _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits
     "hips": ("hip_height_m", 100.0, 1),  # the height to quote: docs/jumps.md says why
     "feet": ("foot_height_m", 100.0, 1),
@@ -40,7 +43,6 @@ _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor
     "flight [ms]": ("flight_s", 1000.0, 0),
 }
 _HEIGHTS = ("hips", "feet", "flight time", "take-off speed")
-_PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
 _JUMPS_CAPTION = (
     "Heights are in cm, each with its 95 % interval. Quote that of the hips over standing: it needs neither the moment "
     "of take-off nor that of landing, and tucked legs do not add to it. Never compare it with a height of another "
@@ -73,16 +75,17 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
     html = render_report(
         "players_report.html.j2",
         summary,
-        alarms=[*players_warnings(summary), *summary["warnings"]],
+        alarms=[*summary["warnings"], *drop_notes(summary)],
         fine_text="Every player was tracked in every frame.",
         definitions={**_DEFINITIONS, "Uncertainty": uncertainty},
-        players=[{"player": name, **player} for name, player in summary["players"].items()],
+        players=[_player_record(name, player) for name, player in summary["players"].items()],
+        notes_of_players=list(notes_of_players(summary)),
         jumps=[_jump_record(row) for row in summary["jumps"]],
         heights_to_quote=[
             (_interval_cm(row, "hips"), f"{row['player']}, jump {row['jump']}: hips") for row in summary["jumps"]
         ],
         viewer=players_viewer(folder, motion),
-        jumps_caption=_JUMPS_CAPTION,
+        notes_of_jumps=[*notes_of_jumps(summary), _JUMPS_CAPTION],
         heights=figures_of(folder) / HEIGHTS_FIGURE,
         heights_caption=_FIGURE_CAPTION,
     )
@@ -90,62 +93,27 @@ def write_players_report(folder: Path, summary: Mapping[str, Any], motion: Playe
     return path
 
 
-def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield, in plain sentences, what the reader of a run of players must not miss."""
-    n = summary["n_frames"]
-    for name, player in summary["players"].items():
-        if player["n_lost"] == n:
-            yield f"{name} was found in no frame: nothing was measured."
-            continue
-        if player["n_lost"]:
-            yield f"{name}: {count_of(player['n_lost'], n, 'frame')} lost; they hold no numbers."
-        if player["n_uncertain"]:
-            yield f"{name}: {count_of(player['n_uncertain'], n, 'frame')} uncertain; look at them before use."
-        if player["n_below_two_cameras"]:
-            yield (
-                f"{name}: {player['n_below_two_cameras']} of {n} frames rest on fewer than two cameras, so that depth "
-                "is a guess."
-            )
-    for jump in summary["jumps"]:
-        if _interval_cm(jump, "hips") == UNKNOWN_TEXT:
-            yield f"{jump['player']}, jump {jump['jump']}: how high the hips rose is not known: {_PEAK_TAKES}."
-    yield from _drop_notes(summary)
-
-
 def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line for each player and jump, and the frames that live tracking dropped."""
+    """Yield a line for each player and jump, each with its notes below, and the frames that live tracking dropped."""
     for name, player in summary["players"].items():
         counts = ", ".join(f"{player[f'n_{status}']} {status}" for status in Status)
         sd_mm = player["median_sd_mm"]
         yield f"{name}: {counts}; median sd of a joint {UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
-        n_posed = player["n_tracked"] + player["n_uncertain"]
-        if n_posed and not player["n_tracked"]:
-            yield f"  no frame of {name} was tracked, so none of these numbers can be relied on"
-        n_alone = min(player["n_below_two_cameras"] - player["n_lost"], player["n_fewer_cameras"])
-        if n_alone > n_posed / 2:
-            yield (
-                f"  in most frames fewer than two cameras agree on {name}: are videos exchanged, clocks off (`airborne "
-                "sync`), or is the calibration another's?"
-            )
+        yield from (f"  {note}" for note in player_notes(player, summary["n_frames"]))
     if not summary["jumps"] and summary["n_frames"] > 1:
         yield "no jump was found"
     for jump in summary["jumps"]:
         hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
-        n = jump["n_uncertain"]
-        warning = f"; {n} of its frames {'is' if n == 1 else 'are'} uncertain" if n else ""
-        said = f"{hips}, hips over standing (95 % interval)"
-        if hips == UNKNOWN_TEXT:
-            said = f"how high the hips rose is not known ({_PEAK_TAKES})"
-        yield f"{jump['player']}, jump {jump['jump']}: {said}{warning}"
-        if (jump["noise_scale"] or 0.0) > _NOISY:
-            off = float(np.sqrt(jump["noise_scale"]))
-            yield (
-                f"  its flight differs from a fall at 9.81 m/s² {off:.1f} times as much as stated errors explain: "
-                "check the frame rate, the clocks and the calibration"
-            )
+        yield f"{jump['player']}, jump {jump['jump']}: {hips}, hips over standing (95 % interval)"
         pairs = zip(_HEIGHTS[1:], others, strict=True)
         yield "  by other definitions: " + ", ".join(f"{what} {height}" for what, height in pairs)
-    yield from _drop_notes(summary)
+        yield from (f"  {note}" for note in jump_notes(jump))
+    yield from drop_notes(summary)
+
+
+def _player_record(name: str, player: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the report's table shows of a player; doubts stand below it."""
+    return {"player": name, **{key: value for key, value in player.items() if key != "doubts"}}
 
 
 def _jump_record(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -161,7 +129,7 @@ def _jump_record(row: Mapping[str, Any]) -> dict[str, Any]:
 
 def _with_interval(row: Mapping[str, Any], name: str, scale: float, digits: int) -> str:
     numbers = [row[name + end] for end in ("", "_low", "_high")]
-    if any(number is None or not np.isfinite(number) for number in numbers):
+    if not all(map(is_known, numbers)):
         return UNKNOWN_TEXT
     middle, low, high = (f"{scale * number:.{digits}f}" for number in numbers)
     return f"{middle} ({low} to {high})"
@@ -170,12 +138,6 @@ def _with_interval(row: Mapping[str, Any], name: str, scale: float, digits: int)
 def _interval_cm(row: Mapping[str, Any], what: str) -> str:
     text = _with_interval(row, *_JUMP_QUANTITIES[what])
     return text if text == UNKNOWN_TEXT else f"{text} cm"
-
-
-def _drop_notes(summary: Mapping[str, Any]) -> Iterator[str]:
-    if live := summary.get("live"):
-        counts = ", ".join(f"{c['name']} {c['n_dropped']} of {c['n_received']}" for c in live["cameras"])
-        yield f"live: frames dropped to keep up: {counts}; delay {1e3 * live['median_delay_s']:.0f} ms (median)"
 
 
 def heights_figure(motion: PlayersMotion) -> Figure:

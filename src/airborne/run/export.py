@@ -23,6 +23,7 @@ from airborne.io.parquet import CAN_WRITE_PARQUET
 from airborne.io.writing import explain_full_disk
 from airborne.motion import Motion, has_inertias, landmarks, measure_flight
 from airborne.motion.run_folder import EXPORTS, holds_players, note_if_unfinished, read_body_run, read_players_run
+from airborne.tracking import Status
 from airborne.types import Array, Progress, StageProgress
 
 EXPORT_FORMATS = ("c3d", "trc", "mot", "osim", "gltf", "bvh", "csv", "parquet")
@@ -126,14 +127,16 @@ def _read_players(folder: Path) -> _RunData:
     takes = player_takes(motion)
     if not takes:
         raise ResultError(f"{folder}: no player was found in any frame, so there is nothing to export; track again")
-    exported = {take.name for take in takes}
-    lost = [
-        name
-        for name, plain in zip(motion.players, portable_names(motion.players), strict=True)
-        if plain not in exported
-    ]
-    notes = (f"found in no frame and left out: {', '.join(lost)}",) if lost else ()
-    return _RunData(takes, players_columns(motion), notes)
+    exported, names = {take.name for take in takes}, portable_names(motion.players)
+    lost = [name for name, plain in zip(motion.players, names, strict=True) if plain not in exported]
+    notes = [f"found in no frame and left out: {', '.join(lost)}"] if lost else []
+    for k, name in enumerate(names):
+        n = int(np.sum(motion.joint_status[:, k] == Status.UNCERTAIN.value))
+        if n:
+            share = f"{n} of {motion.joint_status[:, k].size} points are uncertain"
+            marked = "status in .csv, sd as residual in .c3d, unmarked in .trc, .mot, .bvh and .glb"
+            notes.append(f"{name}: {share}: {marked}")
+    return _RunData(takes, players_columns(motion), tuple(notes))
 
 
 def _measure_in_chunks(

@@ -16,12 +16,15 @@ from airborne.export.players_overlay import PlayersOverlayVideos
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
 from airborne.motion.jumps.heights import LEAST_RATE_HZ, describe_slow_falls, measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
+from airborne.motion.players_doubts import describe_player_doubts
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
 from airborne.run.opening import Opened
 from airborne.run.players_cameras import CameraCheck
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
+from airborne.tracking.capsules.status import UNCERTAIN_SD_M as BLOCKER_SD_M
+from airborne.tracking.particle.tracker import UNCERTAIN_SD_M as PARTICLE_SD_M
 from airborne.tracking.players import PlayersStep, PlayerStart, PlayersTracker, StepTracker
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
@@ -157,10 +160,20 @@ class PlayersRun:
             "start_s": float(motion.time_s[0]),
             "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
             "rate_hz": round(float(recording.rate), 6),
-            "players": {name: _player(motion, k, len(recording.rig)) for k, name in enumerate(motion.players)},
+            "players": {
+                name: {**_player(motion, k, len(recording.rig)), "doubts": self._doubts(motion, name)}
+                for k, name in enumerate(motion.players)
+            },
             "bystanders": [start.name for start in self.starts if not start.has_legs],
             "uncertainty": _UNCERTAINTY,
         }
+
+    def _doubts(self, motion: PlayersMotion, name: str) -> list[str]:
+        """Say which joints are uncertain, and why; not of images that come too rarely, which make all of them so."""
+        is_blocker = isinstance(self.players, Blocker)
+        most_sd_m = BLOCKER_SD_M if is_blocker else PARTICLE_SD_M
+        found = describe_player_doubts(motion, name, most_sd_m=most_sd_m, is_joint_alone=is_blocker)
+        return [] if self._is_slow else list(found)
 
     def keep(self, frames: Frames) -> None:
         """Keep nothing: players are not checked at the end."""

@@ -72,8 +72,8 @@ class CameraCheck:
         if n > 2 and is_off[1:].all() and len(set(np.sign(lag_s[1:]))) == 1:  # all but the clock agree
             lag_s, is_off = np.array([-lag_s[1:].mean(), *[0.0] * (n - 1)]), np.arange(n) == 0
         return [
-            f"self-check: {name} shows the players {1e3 * abs(lag):.0f} ms or more "
-            f"{'later' if lag > 0 else 'earlier'} than its times say; `airborne sync` finds by how much"
+            f"self-check: {name} shows the players {'later' if lag > 0 else 'earlier'} than its times say; by how much "
+            "is not known here: run `airborne sync`, then track again"
             for name, lag, off in zip(names, lag_s, is_off, strict=True)
             if off
         ]

@@ -25,6 +25,7 @@ from airborne.types import Array
 # of the sizes of body and world, chosen: at a rate 10 % too low those of a throw were 23.2 and 23.4 %
 _ALIKE = 0.1
 _CLEARLY_ROUGH = 1.5  # chosen: a factor on standard deviations from which on it is said
+_REMEDIES = {"time_s": ": run `airborne sync`, then track again"}  # by the kind of a finding that is an alarm
 _UNKNOWN_SIZE = (
     "self-check: to one camera only a free fall shows how large a body is, and none was measured: "
     "distances are as right as the sizes in the body's file"
@@ -119,7 +120,7 @@ def alarms(findings: Sequence[Mapping[str, Any]]) -> list[str]:
     A fall tells the size of the body and the world by the frame rate: one that is wrong makes both wrong alike.
     """
     wrong = [finding for finding in findings if finding["is_alarm"]]
-    said = [f"self-check: {finding['sentence']}" for finding in wrong]
+    said = [f"self-check: {finding['sentence']}{_REMEDIES.get(finding['kind'], '')}" for finding in wrong]
     sizes = {finding["subject"]: finding["value"] for finding in wrong if finding["kind"] == "scale"}
     body, world = sizes.get("body", 0.0), sizes.get("world", 0.0)
     if abs(body - world) < _ALIKE * abs(body):

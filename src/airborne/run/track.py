@@ -17,6 +17,7 @@ from airborne.cameras import write_pose2sim
 from airborne.errors import ResultError
 from airborne.export import write_json
 from airborne.export.overlays import OverlaysAs
+from airborne.export.players_notes import players_warnings
 from airborne.export.summary import joint_warnings
 from airborne.io.figures import names_not_drawn
 from airborne.io.folder_lock import sole_writer
@@ -155,6 +156,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
         *subject.warnings(),
         *lost_keys(subject.trial, motion),
         *joint_warnings(summary.get("joint_statuses", {})),
+        *players_warnings(summary),
         *alarms(summary.get("self_check", [])),
     ]
     if (folder / EXPORTS).is_dir():

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from airborne.constants import GRAVITY_M_S2
 from airborne.motion.jumps.events import FlightPosterior, find_flights, find_slow_falls, sample_flight
-from airborne.motion.jumps.jump import UNKNOWN, Jump, Measurement
+from airborne.motion.jumps.jump import UNKNOWN, Jump, Measurement, are_legs_lost
 from airborne.motion.jumps.leg_track import LegTrack, extract_legs
-from airborne.motion.jumps.standing_posture import measure_standing_posture
+from airborne.motion.jumps.standing_posture import NEAR_S, measure_standing_posture
 from airborne.motion.local_polynomials import N_DRAWS, local_fits, peak_draws
 from airborne.motion.players import PlayersMotion
 from airborne.types import Array
@@ -21,7 +21,6 @@ _HIPS_ACCELERATION_PRIOR = (-GRAVITY_M_S2, 3.0, 30.0)  # at the peak: mean and s
 _FEET_ACCELERATION_PRIOR = (-GRAVITY_M_S2, 6.0, 100.0)  # the same of feet, which also turn about the knees
 _BEFORE_S = 0.3  # of take-off: speeds are sought from there
 _UNTRACKED_LIMBS_M_S = 0.05  # sd of the body's speed due to arms and trunk, a tenth and half of the mass
-_NEAR_S = 5.0  # of the flight: where a standing posture is sought
 # [1/s] frames from which jumps are measured: the least at which blocks were tried. At 20 a second a foot of the
 # recorded block jump is 1 m off, and at 15 a flight of a synthetic one 0.14 s too short
 LEAST_RATE_HZ = 29.0
@@ -47,7 +46,7 @@ def measure_jumps(motion: PlayersMotion, *, block_level_m: float = _BLOCK_LEVEL_
         for number, rows in enumerate(flights, 1):
             rng = np.random.default_rng((_SEED, number))
             middle = (track.time_s[rows[0]] + track.time_s[rows[1]]) / 2
-            near = floor & (np.abs(track.time_s - middle) <= _NEAR_S)
+            near = floor & (np.abs(track.time_s - middle) <= NEAR_S)
             flight = sample_flight(rng, track, rows, near)
             jumps.append(_measure_jump(rng, track, flight, near, number=number, block_level_m=block_level_m))
     return tuple(jumps)
@@ -82,26 +81,35 @@ def _measure_jump(
     stand, hips_stand, ankles_stand = measure_standing_posture(rng, track, floor)
     hips = _peak(rng, track, flight, track.mid_hips, acceleration_prior=_HIPS_ACCELERATION_PRIOR)
     ankles = _peak(rng, track, flight, track.mid_ankles, acceleration_prior=_FEET_ACCELERATION_PRIOR)
+    foot_height = None if ankles is None else ankles - ankles_stand
+    hip_height = None if hips is None else hips - hips_stand
+    tuck = Measurement.from_draws(None if foot_height is None or hip_height is None else foot_height - hip_height)
+    is_astray = are_legs_lost(flight.noise_scale, tuck.value)
+    if is_astray:  # feet tell take-off and landing
+        foot_height = takeoff = landing = None
     limb_speed = _UNTRACKED_LIMBS_M_S * rng.standard_normal(N_DRAWS)
     speed = None if takeoff is None else flight.speed(takeoff) + limb_speed
     flight_s = None if takeoff is None or landing is None else landing - takeoff
     start, end = _ankle_position_draws(rng, track, takeoff), _ankle_position_draws(rng, track, landing)
     rows = _flight_rows(track, flight)
-    over = None if hips is None else np.maximum(hips - hips_stand - block_level_m, 0.0)
+    n_uncertain, n_hips_uncertain = (int(each[rows].sum()) for each in (track.is_uncertain, track.are_hips_uncertain))
+    over = None if hip_height is None else np.maximum(hip_height - block_level_m, 0.0)
     is_known = np.isfinite(track.hips[rows]).all(axis=(1, 2)) & np.isfinite(track.ankles[rows]).all(axis=(1, 2))
     return Jump(
         player=track.player,
         number=number,
         status=_STATUS[takeoff is not None, landing is not None],
         n_lost=int((~is_known).sum()),
-        n_uncertain=int(track.is_uncertain[rows].sum()),
+        n_uncertain=n_uncertain,
+        n_hips_uncertain=n_hips_uncertain,
         takeoff_s=Measurement.from_draws(takeoff),
         landing_s=Measurement.from_draws(landing),
         takeoff_frame=Measurement.from_draws(_frames(track, takeoff)),
         landing_frame=Measurement.from_draws(_frames(track, landing)),
         flight_s=Measurement.from_draws(flight_s),
-        foot_height_m=Measurement.from_draws(None if ankles is None else ankles - ankles_stand),
-        hip_height_m=Measurement.from_draws(None if hips is None else hips - hips_stand),
+        foot_height_m=Measurement.from_draws(foot_height),
+        hip_height_m=Measurement.from_draws(hip_height),
+        tuck_m=tuck,
         flight_time_height_m=Measurement.from_draws(None if flight_s is None else GRAVITY_M_S2 * flight_s**2 / 8),
         takeoff_speed_height_m=Measurement.from_draws(None if speed is None else speed**2 / (2 * GRAVITY_M_S2)),
         hip_rise_m=_hip_rise(rng, track, takeoff, hips),
@@ -112,7 +120,9 @@ def _measure_jump(
         takeoff_position_m=_xy(start),
         landing_position_m=_xy(end),
         hip_peak_speed_m_s=_peak_speed(track, flight, track.mid_hips[0][:, None], track.mid_hips[1][:, None]),
-        foot_peak_speed_m_s=_peak_speed(track, flight, track.ankles, track.variances["ankles"]),
+        foot_peak_speed_m_s=UNKNOWN
+        if is_astray
+        else _peak_speed(track, flight, track.ankles, track.variances["ankles"]),
         reach_m=_reach(rng, track, flight),
         standing=stand,
         noise_scale=flight.noise_scale,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from airborne.body.legs import LEG_POINTS
 from airborne.errors import ResultError
-from airborne.motion.players import PlayersMotion
+from airborne.motion.players import PlayersMotion, worst_of
 from airborne.tracking import Status
 from airborne.types import Array
 
@@ -30,7 +30,8 @@ class LegTrack:
     player: str
     index: NDArray[np.int64]  # (n,) frame numbers
     time_s: Array  # (n,)
-    is_uncertain: NDArray[np.bool_]  # (n,) according to the tracker
+    is_uncertain: NDArray[np.bool_]  # (n,) hips, knees or ankles, according to the tracker
+    are_hips_uncertain: NDArray[np.bool_]  # (n,)
     is_measured: NDArray[np.bool_]  # (n,) by two cameras or more, or tracked; nowhere if no frame is tracked
     hips: Array  # (n, 2, 3)
     knees: Array  # (n, 2, 3)
@@ -93,12 +94,14 @@ def extract_legs(motion: PlayersMotion, player: str) -> LegTrack:
             is_stated = np.isfinite(variance) & (variance > 0)
             variance = np.where(is_stated, variance, _UNKNOWN_SD_M**2)
             parts[part] = _remove_spikes(motion.points[:, who][:, at], variance), variance
+    hips = [motion.joints.index(f"hip_{side}") for side in ("left", "right")]
     keys = {"hip": "hips", "knee": "knees", "ankle": "ankles", "foot": "forefeet", "wrist": "wrists"}
     return LegTrack(
         player=player,
         index=motion.index,
         time_s=motion.time_s,
         is_uncertain=motion.status[:, who] == Status.UNCERTAIN.value,
+        are_hips_uncertain=worst_of(motion.joint_status[:, who, hips]) == Status.UNCERTAIN.value,
         is_measured=_is_measured(motion, who),
         hips=parts["hip"][0],
         knees=parts["knee"][0],

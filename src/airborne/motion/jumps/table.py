@@ -19,6 +19,7 @@ _MEASUREMENTS = (
     "flight_s",
     "foot_height_m",
     "hip_height_m",
+    "tuck_m",
     "flight_time_height_m",
     "takeoff_speed_height_m",
     "hip_rise_m",
@@ -40,7 +41,8 @@ def _column_names() -> tuple[str, ...]:
     measured += ["standing_hips_m", "standing_ankles_m"]
     numbers = [column for name in measured for column in (name, f"{name}_low", f"{name}_high")]
     posture = ["standing_source", "standing_first_frame", "standing_last_frame"]
-    return ("player", "jump", "status", *numbers, *posture, "block_level_m", "noise_scale", "n_lost", "n_uncertain")
+    counts = ["n_lost", "n_uncertain", "n_hips_uncertain"]
+    return ("player", "jump", "status", *numbers, *posture, "block_level_m", "noise_scale", *counts)
 
 
 JUMP_COLUMNS = _column_names()
@@ -60,7 +62,8 @@ def jump_row(jump: Jump) -> dict[str, str | int | float]:
     first, last = posture.frames or (np.nan, np.nan)
     row |= {"standing_source": posture.source, "standing_first_frame": first, "standing_last_frame": last}
     row |= {"block_level_m": jump.block_level_m, "noise_scale": jump.noise_scale}
-    return row | {"n_lost": jump.n_lost, "n_uncertain": jump.n_uncertain}
+    counts = {"n_lost": jump.n_lost, "n_uncertain": jump.n_uncertain, "n_hips_uncertain": jump.n_hips_uncertain}
+    return row | counts
 
 
 def write_jumps(path: Path, jumps: Sequence[Jump]) -> None:

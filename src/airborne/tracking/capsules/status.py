@@ -18,7 +18,7 @@ from airborne.video import Frames
 
 # chosen by hand on synthetic blocks: blocker_variants.csv, and hidden_legs.csv for what is called tracked
 _LEAST_SHARE = 0.5  # of the reference evidence per pixel
-_UNCERTAIN_SD_M = 0.06  # above which a joint is uncertain
+UNCERTAIN_SD_M = 0.06  # RMS over the axes, above which a joint is uncertain
 SHAPE = np.arange(N_DOF + PELVIS, N_DOF + N_LENGTHS)  # the constant lengths in a state
 _STEP_M = 1e-4  # of the finite differences
 
@@ -38,7 +38,7 @@ def estimate_player(name: str, frames: Frames, track: Track, *, fitted: JumperFi
     sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 3)
     score = evidence_per_px(fitted.owned)
     is_seen = n_views >= 2 and score >= _LEAST_SHARE * track.reference_evidence
-    is_tracked = is_seen & (sd < _UNCERTAIN_SD_M)
+    is_tracked = is_seen & (sd < UNCERTAIN_SD_M)
     for leg in find_unseen_legs(fitted.owned, track.reference_evidence):
         is_tracked[[2 + leg, 4 + leg, 6 + leg]] = False  # knee, ankle and foot
     return PlayerEstimate(

@@ -25,7 +25,7 @@ from airborne.types import Array
 from airborne.video import Frames
 
 _HAND_SET_SD_M = 0.015  # of the points in the first frame
-_UNCERTAIN_SD_M = 0.10  # a joint less certain than this makes the estimate uncertain
+UNCERTAIN_SD_M = 0.10 / 3**0.5  # RMS over the axes; a joint less certain than this makes the estimate uncertain
 _UNCERTAIN_SHARE = 0.25  # of a part's samples that must match it in a typical camera
 _AIRBORNE_M = 0.08  # both ankles this far above their first positions
 _OCCLUDED_SHARE = 0.5  # of a part, above which `views = "visible"` leaves the camera out
@@ -164,9 +164,9 @@ class LegsTracker:
 def _estimate(name: str, frames: Frames, legs: LegsEstimate, observation: LegsObservation) -> PlayerEstimate:
     parts = observation.log_likelihood(ends_of(legs.points[None]), range(N_PARTS))[0]
     score = float(parts.mean())
-    sd_m = np.sqrt(np.trace(legs.covariance, axis1=-2, axis2=-1))
+    sd_m = np.sqrt(np.trace(legs.covariance, axis1=-2, axis2=-1) / 3)
     least = observation.n_views * np.log(_UNCERTAIN_SHARE)
-    is_certain = score > least and sd_m.max() < _UNCERTAIN_SD_M and observation.n_views > 1
+    is_certain = score > least and sd_m.max() < UNCERTAIN_SD_M and observation.n_views > 1
     return PlayerEstimate(
         player=name,
         index=frames.index,
