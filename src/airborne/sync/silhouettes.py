@@ -159,10 +159,11 @@ def refuse_lost_images(silhouettes: Sequence[Silhouettes], offset_s: Array) -> N
             n_lost = int(np.argmin(costs)) - _MOST_LOST
             if abs(n_lost) > 1 and costs[_MOST_LOST] - min(costs) > _CLEAR_GAIN:
                 when, other = ("before", "after") if is_first_half else ("after", "before")
+                n_later = f"{count(abs(n_lost), 'image')} {'later' if n_lost > 0 else 'earlier'}"
                 raise VideoError(
-                    f"{own.camera.name}: {when} {middle_s:.2f} s or so, its motion fits the other cameras' "
-                    f"{count(abs(n_lost), 'image')} {'later' if n_lost > 0 else 'earlier'} than {other} it: images seem "
-                    "to be missing in the middle of a video; export it again with all its images and their times"
+                    f"{own.camera.name}: {when} {middle_s:.2f} s or so, its motion fits the other cameras' {n_later} "
+                    f"than {other} it: images seem to be missing in the middle of a video; export it again with all its "
+                    "images and their times"
                 )
 
 
