@@ -162,8 +162,8 @@ def refuse_lost_images(silhouettes: Sequence[Silhouettes], offset_s: Array) -> N
                 n_later = f"{count(abs(n_lost), 'image')} {'later' if n_lost > 0 else 'earlier'}"
                 raise VideoError(
                     f"{own.camera.name}: {when} {middle_s:.2f} s or so, its motion fits the other cameras' {n_later} "
-                    f"than {other} it: images seem to be missing in the middle of a video; export it again with all its "
-                    "images and their times"
+                    f"than {other} it: images seem to be missing in the middle of a video; export it again with all "
+                    "its images and times"
                 )
 
 
