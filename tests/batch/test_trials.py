@@ -93,8 +93,11 @@ def test_new_writes_a_session_and_a_trial_for_each_set_of_videos(tmp_path):
     study_folder = tmp_path / "study"
     assert study.notes == (
         "anna_wet_1.toml: no video of right; give it its own [[camera]] tables",
-        f"calib.toml is not there yet: session.toml expects it in {study_folder}",
-        f"body.toml is not there yet: session.toml expects it in {study_folder}",
+        *(
+            f"{study_folder / f'{name}.toml'} is not there yet, but session.toml names it: put it there, "
+            f"or give another as --{option}"
+            for option, name in (("calibration", "calib"), ("body", "body"))
+        ),
     )
     for name in ("calib.toml", "body.toml"):
         write(tmp_path / "study" / name, "")
@@ -118,6 +121,16 @@ def test_new_takes_the_fields_of_interlaced_cameras_from_their_files(tmp_path):
     assert [camera.fields for camera in read_trial(study.trials[0]).camera] == ["top-first", "progressive"]
 
 
+def test_new_writes_one_trial_for_videos_of_players_named_by_their_cameras_alone(tmp_path):
+    for name in ("left.mp4", "right.mp4", "points.csv"):
+        write(tmp_path / name, "")
+    study = write_study(tmp_path, "{camera}.mp4", tmp_path, calibration="points.csv", body="legs")
+    assert study.notes == () and [path.name for path in study.trials] == ["trial.toml"]
+    trial = read_trial(study.trials[0])
+    assert [camera.name for camera in trial.camera] == ["left", "right"]
+    assert trial.calibration.control_points is not None and trial.has_players and trial.start.find
+
+
 def test_new_leaves_files_that_exist_alone(tmp_path):
     write(tmp_path / "videos" / "x_left.mp4", "")
     write(tmp_path / "study" / "session.toml", "# mine\n")
@@ -130,10 +143,12 @@ def test_a_folder_that_is_not_there_is_said_to_be_none(tmp_path):
         write_study(tmp_path / "vidsx", "{number}_{camera}.mp4", tmp_path / "study")
 
 
-@pytest.mark.parametrize("pattern", ["{camera}.mp4", "{number}.mp4", "{a}_{a}_{camera}.mp4", "{day}/{camera}.mov"])
+@pytest.mark.parametrize("pattern", ["{camera}.mov", "{number}.mp4", "{a}_{a}_{camera}.mp4", "{day}/{camera}.mov"])
 def test_a_pattern_that_fits_nothing_is_one_line(tmp_path, pattern):
     write(tmp_path / "x_left.mp4", "")
-    with pytest.raises(AirborneError, match=r"expected \{camera\}|no video's path fits"):
+    with pytest.raises(
+        AirborneError, match=r"expected \{camera\}|no file's path fits .*: it holds x_left\.mp4; write it"
+    ):
         write_study(tmp_path, pattern, tmp_path / "study")
 
 

@@ -1,7 +1,8 @@
 """A run of a body of which no frame is tracked: the mix-up that would explain it is named, and nothing else is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 
 from airborne.cameras import Rig
@@ -28,7 +29,7 @@ class Played:
 
 
 def explained(mix_up, start=None):
-    return explain_untracked(Settings(), CROSS, start or SCENE.start(), Played(mix_up))
+    return explain_untracked(Settings(), CROSS, start or SCENE.start(), Played(mix_up)).sentence
 
 
 @pytest.mark.parametrize("mix_up", [MixUp((0, 1)), MixUp((1, 2)), MixUp((2,))])
@@ -37,8 +38,22 @@ def test_a_mix_up_is_named(mix_up):
     assert said == mix_up.finding(NAMES, f"with {mix_up.describe(NAMES)}, 5 of the first 5 frames are tracked").sentence
 
 
-def test_of_a_wrong_start_nothing_is_said():
-    assert explained(None, SCENE.start().move([0.8, 0.5, 0.0], [0.0, 0.0, 2.0])) is None
+def test_of_a_wrong_start_it_is_said_what_was_tried():
+    said = explained(None, SCENE.start().move([0.8, 0.5, 0.0], [0.0, 0.0, 2.0]))
+    assert said.endswith(
+        "with videos exchanged or mirrored, nor with one camera left out: are [start] and the body's size right?"
+    )
+
+
+def test_a_camera_that_was_moved_is_named():
+    class Moved(Played):
+        def __iter__(self):
+            for frames in super().__iter__():
+                views = [replace(view, image=np.roll(view.rgb, 40, axis=1)) for view in frames.views[1:2]]
+                yield replace(frames, views=(frames.views[0], *views, frames.views[2]))
+
+    why = explain_untracked(Settings(), CROSS, SCENE.start(), Moved(None))
+    assert why.sentence.startswith(f"without {NAMES[1]}, 5 of the first 5 frames are tracked") and not why.is_mix_up
 
 
 def test_what_is_undone_twice_is_as_before():

@@ -17,6 +17,8 @@ from airborne.video import VideoSource, inspect
 
 SESSION, TRIALS = "session.toml", "trials"  # the file and the folder that are written
 _CAMERA = "camera"  # the word of a pattern that tells the videos of a trial apart
+_ALONE = "trial"  # the name of the only trial
+_LEGS = "legs"  # the preset of several players
 _WORD = re.compile(r"\{(\w+)\}")
 
 
@@ -35,21 +37,24 @@ def write_study(
     """Write session.toml and trials/<name>.toml into a folder, for the videos whose paths below `videos` fit a pattern.
 
     Words in braces, as in "{athlete}_{condition}_{number}_{camera}.mp4", become labels; `{camera}` tells the videos of
-    one trial apart. Paths of calibration and body are as seen from `folder`, and may hold the words. A camera whose
-    first video is flagged as interlaced gets its `fields`. Files that exist are left alone. Raises AirborneError for a
-    pattern that is none, or that fits no video.
+    one trial apart; alone, it stands for the videos of one trial. Paths of calibration and body are as seen from
+    `folder`, and may hold the words; a calibration that ends in .csv is a table of control points, the body "legs" that
+    of players, who are looked for. A camera whose first video is flagged as interlaced gets its `fields`. Files that
+    exist are left alone. Raises AirborneError for a pattern that is none, or that fits no video.
     """
     if not videos.is_dir():
         raise AirborneError(f"{videos} is no folder; check the path")
     words = _WORD.findall(pattern)
-    if _CAMERA not in words or len(words) < 2 or len(set(words)) < len(words):
+    if _CAMERA not in words or len(set(words)) < len(words):
         raise AirborneError(
-            f"pattern {pattern}: expected {{camera}} and other words in braces, each once, such as "
+            f"pattern {pattern}: expected {{camera}}, and of several trials other words in braces, each once, such as "
             "{athlete}_{condition}_{number}_{camera}.mp4"
         )
     found = _match(videos, pattern)
     if not found:
-        raise AirborneError(f"{videos}: no video's path fits {pattern}; write it as seen from that folder")
+        names = sorted(path.relative_to(videos).as_posix() for path in videos.rglob("*") if path.is_file())
+        there = f"it holds {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" if names else "it is empty"
+        raise AirborneError(f"{videos}: no file's path fits {pattern}: {there}; write it as seen from that folder")
     cameras = sorted({camera for by_camera in found.values() for camera in by_camera})
     labels = [word for word in words if word != _CAMERA]
     folder.mkdir(parents=True, exist_ok=True)
@@ -67,15 +72,15 @@ def write_study(
         ]
     _write_new(session, _session_text(tables, calibration=calibration, body=body))
     for values, by_camera in sorted(found.items()):
-        files.append(folder / TRIALS / f"{'_'.join(values)}.toml")
+        files.append(folder / TRIALS / f"{'_'.join(values) or _ALONE}.toml")
         _write_new(files[-1], _trial_text(dict(zip(labels, values, strict=True))))
         missing = [camera for camera in cameras if camera not in by_camera]
         if missing:
             notes.append(f"{files[-1].name}: no video of {', '.join(missing)}; give it its own [[camera]] tables")
     notes += [
-        f"{name} is not there yet: {SESSION} expects it in {folder}"
-        for name in (calibration, body)
-        if not (_WORD.search(name) or (folder / name).is_file())
+        f"{folder / name} is not there yet, but {SESSION} names it: put it there, or give another as --{option}"
+        for option, name in (("calibration", calibration), ("body", body))
+        if not (_WORD.search(name) or name == _LEGS or (folder / name).is_file())
     ]
     return NewStudy(session, tuple(files), tuple(notes))
 
@@ -119,17 +124,19 @@ def _session_text(cameras: Sequence[Mapping[str, str]], *, calibration: str, bod
     for camera in cameras:
         tables.append(tomlkit.item(dict(camera)))
     document["camera"] = tables
-    document["calibration"] = {"file": calibration}
-    document["body"] = {"file": body}
+    document["calibration"] = {"control_points" if calibration.lower().endswith(".csv") else "file": calibration}
+    document["body"] = {"preset": body} if body == _LEGS else {"file": body}
+    if body == _LEGS:
+        document["start"] = {"find": True}
     return tomlkit.dumps(document)
 
 
 def _trial_text(labels: Mapping[str, str]) -> str:
-    inline = tomlkit.inline_table()
-    inline.update(labels)
     document = tomlkit.document()
     document["session"] = f"../{SESSION}"
-    document["labels"] = inline
+    if labels:
+        document["labels"] = tomlkit.inline_table()
+        document["labels"].update(labels)
     return tomlkit.dumps(document)
 
 

@@ -72,8 +72,12 @@ def new_command(
     *,
     pattern: Annotated[str, typer.Option(help="How their paths below it are made; words in braces become labels.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for session.toml and trials/.")],
-    calibration: Annotated[str, typer.Option(help="The calibration file, as seen from the output.")] = "calib.toml",
-    body: Annotated[str, typer.Option(help="The body file, likewise; may hold {athlete}.")] = "body.toml",
+    calibration: Annotated[
+        str, typer.Option(help="The calibration, or a .csv of control points, from the output.")
+    ] = "calib.toml",
+    body: Annotated[
+        str, typer.Option(help="The body file, likewise; may hold {athlete}. Of players: legs.")
+    ] = "body.toml",
 ) -> None:
     """Write a session and its trials from a folder of videos, for `airborne batch`; files that exist are left alone.
 

@@ -229,9 +229,8 @@ class BodyRun:
     ) -> tuple[Motion, dict[str, Any]]:
         """Check the run, fit it and write the tables; return the motion and the beginning of the summary."""
         sort_rows(folder / self.table)
-        motion, model, begun_s = read_motion(folder / self.table), self.model, time.monotonic()
-        is_preset = self.trial.body.file is None
-        checked = check_run(motion, model, self.recording.rig, self.kept, is_preset=is_preset)
+        motion, model, rig, begun_s = read_motion(folder / self.table), self.model, self.recording.rig, time.monotonic()
+        checked = check_run(motion, model, rig, self.kept, is_preset=self.trial.body.file is None)
         fitted, timings_s = None, {"self_check": time.monotonic() - begun_s}
         if self._fits_whole_run:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))
@@ -243,13 +242,13 @@ class BodyRun:
         measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
-        flight = wrong_flight(motion, measured.flight)
-        doubts = far_keys(self.trial, model, motion, self.recording.rig)
-        self.recording.events.extend([*checked.doubts, *doubts])
+        of_fall = wrong_flight(motion, measured.flight)
+        findings = [*([of_fall.to_dict()] if of_fall else []), *checked.findings]
+        self.recording.events.extend([*checked.doubts, *far_keys(self.trial, model, motion, rig)])
         if not motion.count(Status.TRACKED) and len(motion) > 1:
-            args = self.trial.settings, model, self.start, self.recording, progress_of("trying videos exchanged")
-            self.recording.events.extend(filter(None, [explain_untracked(*args)]))
-        is_exact = not self.recording.rig.states_errors
+            args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
+            self.recording.events.append((why := explain_untracked(*args)).sentence)
+            findings = [] if why.is_mix_up else findings
         return motion, {
             "name": self.trial.name,
             **headline(motion),
@@ -257,8 +256,8 @@ class BodyRun:
             **({} if measured.flight is None else {"flight": flight_summary(motion, measured.flight).to_dict()}),
             **({} if fitted is None else {"whole_run": fitted.surface}),
             "has_lasting_errors": motion.lasting is not None,
-            "self_check": [*([] if flight is None else [flight.to_dict()]), *checked.findings],
-            "uncertainty": _UNCERTAINTY if is_exact else _UNCERTAINTY + _CALIBRATION_UNCERTAINTY,
+            "self_check": findings,
+            "uncertainty": _UNCERTAINTY + (_CALIBRATION_UNCERTAINTY if rig.states_errors else ""),
             "timings_s": timings_s,
         }
 
