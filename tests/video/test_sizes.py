@@ -17,6 +17,7 @@ from tests.support.scenes import CAMERAS
         ((0.5, 0.5), "saved_scale = 2 and saved_offset_px = [0.5, 0.5]"),
         ((1.5, 1.5), "saved_scale = 0.666667 and saved_offset_px = [-0.166667, -0.166667]"),
         ((0.75, 0.5), "saved_offset_px, where its first"),
+        ((0.75, 0.5), "if it was resized too, saved_scale as well"),
         ((1.25, 0.5), None),
     ],
 )
