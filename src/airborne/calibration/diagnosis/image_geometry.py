@@ -19,13 +19,13 @@ _BENT = 3.0  # times a model's residuals: what the direct linear transformation 
 _OFF_CENTRE = 0.15  # of the image's diagonal, of one camera
 # of the diagonal; chi-square of that with 2 degrees of freedom; and of the scatter, for each: of cameras that lie off
 # alike. Chosen on 84 sets of synthetic points, 8 to 24 for each of two to four cameras, 1 px of noise: of right sizes
-# none is reported, of those off by 9 % of the diagonal 71, by 12 % 80
+# none is reported, of those off by 9 % of the diagonal 69, by 12 % 80
 _OFF_ALIKE, _LEAST_CHI2, _MOST_SCATTER = 0.05, 25.0, 3.0
 _LENS_SD = 0.01  # of the diagonal, chosen: how far a camera's axis lies off the middle
 _SIGNIFICANCE = 1e-3  # chosen: of an image that is not as the user says
 _TELLING = 15  # control points, with which a camera is well determined: docs/reference/calibration.md
 _MOST_ROLL = np.radians(60)  # about the optical axis: cameras stand roughly upright
-_N_DLT = 11
+_N_DLT = 11  # numbers of the direct linear transformation
 
 
 def is_straight(solution: Solution) -> bool:
