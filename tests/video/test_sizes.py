@@ -30,6 +30,12 @@ def test_mend_of_a_size(factor, mend):
     assert mend in str(error.value) if mend else "saved_" not in str(error.value)
 
 
+def test_a_video_on_its_side_is_said_to_be_turned():
+    camera = replace(CAMERAS[0], size=(768, 576))
+    with pytest.raises(VideoError, match=r"576×768 px, but .* turned by 90 degrees, .* take the flag out$"):
+        check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [(576, 768)])
+
+
 def test_every_camera_of_another_size_is_named_in_one_line():
     cameras = [replace(CAMERAS[0], name=name) for name in ("a", "b", "c")]
     sizes = [(8, 8), cameras[1].size, (8, 8)]

@@ -32,6 +32,11 @@ def check_sizes(sources: Sequence[VideoSource], rig: Rig, sizes: Sequence[Size])
 
 def _saved_otherwise(size: Size, calibrated: Size) -> str:
     """Say what to write for a video that shows what was calibrated, saved at another size or cut out of it."""
+    if tuple(size) == tuple(calibrated)[::-1]:
+        return (
+            "; it is turned by 90 degrees, by itself or by a flag in its file: write it anew as it was calibrated, or "
+            "take the flag out"
+        )
     across, down = (b / a for a, b in zip(size, calibrated, strict=True))
     if math.isclose(across, down, rel_tol=_SAME_SHAPE):
         return f"; if the picture was only resized, write under [[camera]] {lines_of_scale(across)}"
