@@ -163,7 +163,14 @@ def test_points_of_other_cameras_end_with_exit_code_1_and_another_file(tmp_path,
     (tmp_path / "points.csv").write_text("\n".join(["point,x_m,y_m,z_m,cam_u,cam_v", *rows]))
     argv = ["airborne", "calibrate", str(tmp_path / "points.csv"), "--size", "640x480", "-o", str(tmp_path / "c.toml")]
     monkeypatch.setattr("sys.argv", argv)
+    said = []  # on either stream
+    monkeypatch.setattr("airborne.cli.calibrate.errors.print", lambda text, **_: said.append(text))
+    monkeypatch.setattr("builtins.print", said.append)
     with pytest.raises(SystemExit) as stopped:
         cli.main()
+    *rejection, result = said
+    assert all(text.startswith("airborne: ") for text in rejection)
+    assert "no calibration to measure with" in rejection[-1]
+    assert result.startswith("camera ")
     assert not (tmp_path / "c.toml").exists()
     assert stopped.value.code == 1 and (tmp_path / "c.rejected.toml").exists(), capsys.readouterr().err

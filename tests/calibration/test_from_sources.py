@@ -61,7 +61,9 @@ def test_a_place_that_no_source_shows_is_open(by_board):
 def test_left_out_errors_far_beyond_the_fits_bring_a_warning(by_board):
     assert "what is left out of the fit" not in describe_calibration(by_board)
     far = {name: 5 * distances for name, distances in by_board.held_out_px.items()}
-    assert "warning: what is left out of the fit lies 5" in describe_calibration(replace(by_board, held_out_px=far))
+    said = describe_calibration(replace(by_board, held_out_px=far))
+    assert "warning: what is left out of the fit lies 5" in said
+    assert "those in the calibration file are enlarged by it" in said
 
 
 @pytest.fixture(scope="module")

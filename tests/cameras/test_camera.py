@@ -1,9 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.errors import CalibrationError
 from tests.support.cameras import LENS, camera_at, scattered, three_cameras
 from tests.support.tolerances import ROUNDTRIP
+
+
+def test_a_camera_at_the_origin_stands_at_zero_and_not_at_minus_zero():
+    turn = RigidTransform.from_rotation(Rotation.from_euler("xyz", [10, 20, 30], degrees=True))
+    assert not np.signbit(replace(camera_at((3, -4, 2)), camera_from_world=turn).centre).any()
 
 
 def test_an_undistorted_pixel_is_the_pixel_of_the_undistorted_camera():

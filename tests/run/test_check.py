@@ -5,6 +5,7 @@ import shutil
 from dataclasses import replace
 
 import av
+import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -15,6 +16,7 @@ from airborne.run.check import check_trial
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from airborne.video import inspect
+from tests.support.clips import write_clip
 from tests.support.places import ROOT
 from tests.support.players_trial import write_trial
 from tests.support.run_files import files_of
@@ -186,6 +188,30 @@ def test_a_video_that_is_said_to_lie_beside_its_calibration_is_refused(folder, s
     (mistake,) = check_trial(path).mistakes
     assert mistake.startswith("camera 'cam1': saved_scale = ") and "takes its 768×576 px to columns" in mistake
     assert mistake.endswith("of the calibration's 768×576 px; correct saved_scale or saved_offset_px")
+
+
+@pytest.mark.parametrize(
+    ("shape", "rotation_deg", "said"),
+    [
+        ((576, 768, 3), 90, "px, by the flag in the file that turns it by"),
+        ((768, 576, 3), 0, "px, but control_points.csv was clicked in pictures of 768×576"),
+    ],
+)
+def test_a_video_turned_since_its_points_were_clicked_says_what_to_do(folder, shape, rotation_deg, said):
+    write_clip(
+        folder / "cam2.mp4",
+        [np.zeros(shape, np.uint8)] * 2,
+        codec="libx264",
+        pix_fmt="yuv420p",
+        rotation_deg=rotation_deg,
+    )
+    clicks = ('file = "calib_true.toml"', 'control_points = "control_points.csv"')
+    path = edit(folder, *[('fields = "top-first"', "")] * 3, clicks)
+    mistakes = [each for each in check_trial(path).mistakes if "cam2" in each]
+    assert len(mistakes) == 1
+    assert mistakes[0].startswith("camera 'cam2': its video is 576×768 px")
+    assert said in mistakes[0]
+    assert "take the flag out" in mistakes[0] if rotation_deg else "write the video anew, upright" in mistakes[0]
 
 
 def test_a_camera_that_is_turned_away_from_the_start_is_noted(folder):

@@ -47,6 +47,22 @@ def test_a_file_of_varying_rate_keeps_its_own_stamps(tmp_path):
     assert [picture.time_s * 90000 for picture in read(path)[1]] == stamps
 
 
+@pytest.mark.parametrize(("step", "rate"), [(1, 600), (12, 50)])
+def test_an_avi_that_counts_time_finely_has_the_rate_of_its_pictures(tmp_path, step, rate):
+    path = write_clip(
+        tmp_path / "a.avi",
+        numbered(8),
+        rate=Fraction(600),
+        codec="mjpeg",
+        pix_fmt="yuvj420p",
+        stamps=range(0, 8 * step, step),
+        time_base=Fraction(1, 600),
+    )
+    facts, seen = read(path)
+    assert facts.frame_rate == rate
+    assert [picture.time_s for picture in seen] == [Fraction(k, rate) for k in range(8)]
+
+
 @pytest.mark.parametrize("name", ["a.mkv", "a.ts"])
 def test_times_start_at_the_first_image(tmp_path, name):
     codec = "libx264" if name.endswith("ts") else "ffv1"

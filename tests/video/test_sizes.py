@@ -17,6 +17,7 @@ from tests.support.scenes import CAMERAS
         ((0.5, 0.5), "saved_scale = 2 and saved_offset_px = [0.5, 0.5]"),
         ((1.5, 1.5), "saved_scale = 0.666667 and saved_offset_px = [-0.166667, -0.166667]"),
         ((0.75, 0.5), "saved_offset_px, where its first"),
+        ((0.75, 0.5), "if it was resized too, saved_scale as well"),
         ((1.25, 0.5), None),
     ],
 )
@@ -27,6 +28,12 @@ def test_mend_of_a_size(factor, mend):
         check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [size])
     assert "\n" not in str(error.value)
     assert mend in str(error.value) if mend else "saved_" not in str(error.value)
+
+
+def test_a_video_on_its_side_is_said_to_be_turned():
+    camera = replace(CAMERAS[0], size=(768, 576))
+    with pytest.raises(VideoError, match=r"576×768 px, but .* turned by 90 degrees, .* take the flag out$"):
+        check_sizes([VideoSource(camera.name, "a.mp4")], Rig((camera,)), [(576, 768)])
 
 
 def test_every_camera_of_another_size_is_named_in_one_line():

@@ -124,7 +124,7 @@ def calibrate(
         method=method,
         fits=tuple(fits),
         held_out_points_m=_point_errors_left_out(points, solutions),
-        findings=check_solutions(points, sizes, decompositions, solutions),
+        findings=check_solutions(points, sizes, decompositions, candidates, solutions),
     )
 
 

@@ -149,7 +149,8 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
     if held_out_px > _SUSPECT_RATIO * rms_px:
         sentences.append(
             f"what is left out of the fit lies {held_out_px / rms_px:.1f} times as far from its prediction as what is "
-            "in it: the standard deviations are too small by about as much; record more poses, slower, in every corner"
+            "in it: the standard deviations in this report are too small by about as much, those in the calibration "
+            "file are enlarged by it; record more poses, slower, in every corner"
         )
     places = [each.name for each in calibration.rig if _place_sd_m(_sds(calibration, each)) > _OPEN_SD_M]
     if places:

@@ -60,7 +60,7 @@ class Camera:
     @property
     def centre(self) -> Array:
         """The camera's position in the world: (3,) [m]."""
-        return self.camera_from_world.inv().translation
+        return self.camera_from_world.inv().translation + 0.0  # no -0
 
     @property
     def is_distorted(self) -> bool:

@@ -114,10 +114,10 @@ def _from_control_points(
     table = read_control_points(points)
     calibration = calibrate_cameras(table, _sizes(size, table.cameras), method=method)
     written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration, table.names))
-    print(json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration))
-    if not as_json:
-        print(f"written: {written}")
-    _reject(written, reasons)
+    report = (
+        json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration)
+    )
+    _print_result(report, written, reasons, as_json=as_json)
 
 
 def _read_sources(path: Path) -> Any:
@@ -222,21 +222,22 @@ def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> No
     written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration))
     pictures = write_residual_figures(folder, calibration)
     write_text(folder / "report.json", json.dumps(report, indent=1))
-    print(json.dumps(report) if as_json else describe_calibration(calibration))
-    if not as_json:
-        print(f"written: {written}\nreport: {folder / 'report.json'} and {count(len(pictures), 'image')} beside it")
-    _reject(written, reasons)
+    beside = f"report: {folder / 'report.json'} and {count(len(pictures), 'image')} beside it"
+    text = json.dumps(report) if as_json else f"{describe_calibration(calibration)}\n{beside}"
+    _print_result(text, written, reasons, as_json=as_json)
 
 
-def _reject(written: Path, reasons: tuple[str, ...]) -> None:
-    """Say why a calibration was rejected, and end with exit code 1; nothing where it was accepted."""
+def _print_result(text: str, written: Path, reasons: tuple[str, ...], *, as_json: bool) -> None:
+    """Print a calibration; before it why it was rejected, and then end with exit code 1."""
+    if reasons:
+        reasons = (*reasons, f"this is no calibration to measure with; to look at it: {written}")
     for reason in reasons:
         errors.print(f"airborne: {reason}", style="red", markup=False)
+    print(text)
     if reasons:
-        errors.print(
-            f"airborne: this is no calibration to measure with; to look at it: {written}", style="red", markup=False
-        )
         raise typer.Exit(1)
+    if not as_json:
+        print(f"written: {written}")
 
 
 def _sizes(text: str, names: tuple[str, ...]) -> dict[str, tuple[int, int]]:

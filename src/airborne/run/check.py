@@ -117,9 +117,8 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
     calibration, body, detections = trial.calibration, trial.body, trial.start.detections
     shown = trial.model_copy(update={"camera": [camera for camera in trial.camera if camera.name in facts]})
     if facts and _exists(trial, calibration.file or calibration.control_points):
-        sizes = {name: each.size for name, each in facts.items()}
         cameras = checks.attempt(
-            lambda: read_or_calibrate(shown, sizes), lambda cameras: f"calibration: {', '.join(cameras[0].names)}"
+            lambda: read_or_calibrate(shown, facts), lambda cameras: f"calibration: {', '.join(cameras[0].names)}"
         )
         for warning in cameras[1].warnings if cameras is not None and cameras[1] is not None else ():
             checks.add(f"note: {warning}")

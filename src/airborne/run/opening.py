@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from airborne.calibration.acceptance import require_plausible
+from airborne.calibration.diagnosis import is_turned
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import read_control_points
 from airborne.cameras import Camera, Rig, read_rig
@@ -92,8 +93,8 @@ def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opene
 def open_live(trial: Trial, waiting: Callable[[], None] = lambda: None) -> Iterator[Opened[LiveRecording]]:
     """Connect to a trial's live cameras and find where they are; `waiting` is called until all deliver frames."""
     with connect([video_source(trial, camera) for camera in trial.camera], waiting) as cameras:
-        sizes = {camera.source.name: camera.facts.size for camera in cameras if camera.facts is not None}
-        rig, calibration = read_or_calibrate(trial, sizes)
+        facts = {camera.source.name: camera.facts for camera in cameras if camera.facts is not None}
+        rig, calibration = read_or_calibrate(trial, facts)
         recording = live_recording(
             cameras, rig, every=trial.track.every, start=trial.start.frame, stop=trial.track.stop
         )
@@ -103,8 +104,8 @@ def open_live(trial: Trial, waiting: Callable[[], None] = lambda: None) -> Itera
 def open_cameras(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Cameras:
     """Inspect a trial's videos and read its cameras and detections, each once."""
     facts = tuple(facts or (inspect(video_source(trial, camera)) for camera in trial.camera))
-    sizes = {camera.name: each.size for camera, each in zip(trial.camera, facts, strict=True)}
-    rig, calibration = read_or_calibrate(trial, sizes)
+    facts_of = {camera.name: each for camera, each in zip(trial.camera, facts, strict=True)}
+    rig, calibration = read_or_calibrate(trial, facts_of)
     detections = read_trial_detections(trial, facts)
     notes: tuple[str, ...] = ()
     if detections is not None:
@@ -112,8 +113,9 @@ def open_cameras(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Cam
     return Cameras(rig, calibration, detections, facts, notes)
 
 
-def read_or_calibrate(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[Rig, Calibration | None]:
-    """Return the calibrated cameras of images of these sizes (width, height) [px]."""
+def read_or_calibrate(trial: Trial, facts: Mapping[str, VideoFacts]) -> tuple[Rig, Calibration | None]:
+    """Return the calibrated cameras of videos, by camera."""
+    sizes = {name: each.size for name, each in facts.items()}
     if trial.calibration.control_points is not None:
         points = read_control_points(trial.path(trial.calibration.control_points))
         missing = [name for name in sizes if name not in points.cameras]
@@ -122,7 +124,11 @@ def read_or_calibrate(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[
                 f"{trial.calibration.control_points} has no points clicked in {', '.join(missing)}; "
                 f"it has: {', '.join(points.cameras)}"
             )
-        calibration = calibrate(points.select(list(sizes)), sizes, method=trial.calibration.method)
+        points = points.select(list(sizes))
+        for camera, px in zip(points.cameras, np.moveaxis(points.px, 1, 0), strict=True):
+            if is_turned(px, sizes[camera]):
+                raise _turned_error(trial, camera, facts[camera])
+        calibration = calibrate(points, sizes, method=trial.calibration.method)
         require_plausible(calibration)
         return calibration.rig, calibration
     rig = read_rig(trial.path(trial.calibration.file or ""))
@@ -134,6 +140,18 @@ def read_or_calibrate(trial: Trial, sizes: dict[str, tuple[int, int]]) -> tuple[
                 "calibration of its own"
             )
     return Rig(cameras), None
+
+
+def _turned_error(trial: Trial, camera: str, facts: VideoFacts) -> TrialError:
+    """Return the error of a video that lies on its side in comparison with its camera's control points."""
+    width, height = facts.size
+    flag = f", by the flag in the file that turns it by {facts.rotation_deg} degrees" if facts.rotation_deg else ""
+    mend = "take the flag out of the file" if facts.rotation_deg else "write the video anew, upright"
+    return TrialError(
+        f"camera '{camera}': its video is {width}×{height} px{flag}, but {trial.calibration.control_points} was "
+        f"clicked in pictures of {height}×{width}: one of them is turned by 90 degrees; {mend}, or click anew in "
+        "the pictures that `airborne studio` shows"
+    )
 
 
 def _camera_as_saved(rig: Rig, table: CameraTable, size: tuple[int, int]) -> Camera:

@@ -19,7 +19,7 @@ from airborne.studio.jpeg_store import JpegStore, Key
 from airborne.studio.prefetch import Prefetch
 from airborne.trial.cameras import CameraTable
 from airborne.types import Image
-from airborne.video import VideoSource
+from airborne.video import VideoFacts, VideoSource
 from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, match_images
 
 _MOST_BYTES = 300_000_000  # of JPEG on the disk: three cameras of 1080p for a minute, at a quarter of their size
@@ -47,7 +47,12 @@ class ShownTrial:
     @property
     def sizes(self) -> dict[str, tuple[int, int]]:
         """Camera -> (width, height) [px]."""
-        return {source.name: index.facts.size for source, index in zip(self.sources, self.indexes, strict=True)}
+        return {name: facts.size for name, facts in self.facts.items()}
+
+    @property
+    def facts(self) -> dict[str, VideoFacts]:
+        """Camera -> what its file states."""
+        return {source.name: index.facts for source, index in zip(self.sources, self.indexes, strict=True)}
 
 
 class _Video:

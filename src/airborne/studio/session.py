@@ -97,10 +97,10 @@ class Session:
         return self._keep("rig", stamp, lambda: self._read_rig(project))
 
     def _read_rig(self, project: Project) -> Rig:
-        sizes = self.shown().sizes
-        rig = read_or_calibrate(self._as_far_as_cameras(), sizes)[0]
+        shown = self.shown()
+        rig = read_or_calibrate(self._as_far_as_cameras(), shown.facts)[0]
         source = {camera.name: project.source(camera) for camera in project.cameras}
-        check_sizes([source[name] for name in rig.names], rig, [sizes[name] for name in rig.names])
+        check_sizes([source[name] for name in rig.names], rig, [shown.sizes[name] for name in rig.names])
         return rig
 
     def file(self, name: str) -> Path:

@@ -8,7 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
+from statistics import median
 from typing import Literal, NamedTuple, get_args
 
 import av
@@ -25,6 +27,8 @@ from airborne.video.pixels import field_frame, rgb_from_frame
 
 FieldOrder = Literal["progressive", "top-first", "bottom-first"]
 FieldOrderOption = Literal["progressive", "top-first", "bottom-first", "auto"]
+
+_FALSE_RATE, _FEWEST_INDEXED = 2, 3  # chosen: times the rate of the pictures; of them, for a rate
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +119,7 @@ def facts_of(source: VideoSource, container: InputContainer, stream: VideoStream
 
     Raises VideoError where it states no frame rate, or where a rotated one is to be read by fields.
     """
-    rate = stream.average_rate or stream.guessed_rate
+    rate = _rate(container, stream)
     if not rate:
         raise VideoError(f"{source.name}: {source.path} states no frame rate; convert it to a constant rate")
     if frame.rotation % 90:
@@ -223,6 +227,20 @@ def _count_cut(path: Path, stream: VideoStream) -> int:
     """Count the images that a file's index names beyond its end, as where it was not copied whole; 0 for a pipe."""
     size = path.stat().st_size if path.is_file() else math.inf
     return sum(entry.pos + entry.size > size for entry in stream.index_entries)
+
+
+def _rate(container: InputContainer, stream: VideoStream) -> Fraction | None:
+    """Return the rate that a file states [1/s]; None where it states none.
+
+    An AVI file states how finely it counts time, which may be finer than its pictures follow one another: then the
+    rate is that of their median step, as its index has it, which lists every picture.
+    """
+    stated = stream.average_rate or stream.guessed_rate
+    stamps = [entry.timestamp for entry in stream.index_entries] if container.format.name == "avi" else []
+    if not stated or not stream.time_base or len(stamps) < _FEWEST_INDEXED:
+        return stated
+    step_s = int(median(b - a for a, b in pairwise(stamps))) * stream.time_base
+    return 1 / step_s if step_s * stated >= _FALSE_RATE else stated
 
 
 def _exact_rate(rate: Fraction) -> Fraction:

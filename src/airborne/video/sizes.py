@@ -32,12 +32,24 @@ def check_sizes(sources: Sequence[VideoSource], rig: Rig, sizes: Sequence[Size])
 
 def _saved_otherwise(size: Size, calibrated: Size) -> str:
     """Say what to write for a video that shows what was calibrated, saved at another size or cut out of it."""
+    if tuple(size) == tuple(calibrated)[::-1]:
+        return (
+            "; it is turned by 90 degrees, by itself or by a flag in its file: write it anew as it was calibrated, or "
+            "take the flag out"
+        )
     across, down = (b / a for a, b in zip(size, calibrated, strict=True))
     if math.isclose(across, down, rel_tol=_SAME_SHAPE):
-        offset_px = f"{(across - 1) / 2:.6g}"
-        how, lines = "resized", f"saved_scale = {across:.6g} and saved_offset_px = [{offset_px}, {offset_px}]"
-    elif across >= 1 and down >= 1:
-        how, lines = "cut out of the calibrated one", "saved_offset_px, where its first pixel lies in that"
-    else:
+        return f"; if the picture was only resized, write under [[camera]] {lines_of_scale(across)}"
+    if across < 1 or down < 1:
         return ""
-    return f"; if the picture was only {how}, write under [[camera]] {lines}"
+    return (
+        "; if the picture was only cut out of the calibrated one, write under [[camera]] saved_offset_px, where its "
+        "first pixel lies in that; if it was resized too, saved_scale as well: calibration px = saved_scale × video px "
+        "+ saved_offset_px"
+    )
+
+
+def lines_of_scale(scale: float) -> str:
+    """Return what a trial says of a video whose pixels are each `scale` of the calibration's wide."""
+    offset_px = f"{(scale - 1) / 2:.6g}"
+    return f"saved_scale = {scale:.6g} and saved_offset_px = [{offset_px}, {offset_px}]"

@@ -86,6 +86,18 @@ def test_points_outside_the_image_are_counted_and_named(points, sizes):
     )
 
 
+@pytest.mark.parametrize(("small", "scale"), [((384, 288), 2), ((512, 384), 1.5), ((576, 432), 1.33333)])
+def test_clicks_of_a_video_that_was_reduced_since_say_by_how_much(points, small, scale):
+    message = error_of(points, dict.fromkeys(points.cameras, small))
+    assert "they fit 768×576" in message
+    assert "calibrate with --size 768x576; in a trial of reduced videos give the result as file" in message
+    assert f"saved_scale = {scale} and saved_offset_px" in message
+
+
+def test_clicks_outside_that_no_reduction_explains_are_to_be_corrected(points):
+    assert error_of(points, dict.fromkeys(points.cameras, (60, 40))).endswith("correct them, or the image size")
+
+
 def test_one_wrong_click_is_named_and_others_are_not(points, sizes):
     wrong = clicked(points, "cam1", lambda px: px + 12 * np.array([1, -1]) * (np.arange(24)[:, None] == 12))
     [finding] = calibrate(restrict_to_cameras(wrong, "cam1"), sizes).findings
@@ -113,7 +125,18 @@ def test_a_wrong_survey_is_told_from_a_wrong_click(points, sizes):
 
 def test_millimetres_given_as_metres_are_refused(points, sizes):
     message = error_of(replace(points, world=points.world * 1000), sizes)
-    assert message == ("the control points span 3368 m, expected a scene in metres: divide by 1000 if they are in mm")
+    assert message == (
+        "the control points span 3368 m, expected a scene in metres: they would span 34 m if in cm (divide by 100), "
+        "3.4 m if in mm (divide by 1000), 86 m if in inches (multiply by 0.0254)"
+    )
+
+
+def test_a_unit_that_makes_no_scene_is_not_proposed(points, sizes):
+    message = error_of(replace(points, world=points.world * 20_000), sizes)
+    assert "67 m if in mm" in message
+    assert " cm " not in message
+    assert "inches" not in message
+    assert error_of(replace(points, world=points.world * 1e6), sizes).endswith("correct x_m, y_m, z_m")
 
 
 def test_a_single_point_in_millimetres_is_named(points, sizes):
@@ -125,7 +148,7 @@ def test_a_single_point_in_millimetres_is_named(points, sizes):
 
 def test_a_hundred_metres_are_flagged(points, sizes):
     warnings = warnings_of(replace(points, world=points.world * 100), sizes, "cam3")
-    assert "the control points span 337 m: are they in metres?" in warnings
+    assert "the control points span 337 m: are they in metres? they would span 3.4 m if in cm" in " ".join(warnings)
 
 
 def test_a_wrong_image_size_shows_as_an_axis_off_the_middle(points):

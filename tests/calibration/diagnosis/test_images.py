@@ -77,7 +77,7 @@ def test_two_cameras_alone_cannot_tell_which_is_turned():
     [
         ((1080, 1920), "turned by 90 degrees"),
         ((1280, 720), "saved 0.667 times as large; give saved_scale = 1.5"),
-        ((1440, 1080), "cropped (give saved_offset_px), or the camera has another mode"),
+        ((1440, 1080), "cropped (give saved_offset_px, and saved_scale if it was resized too), or the camera"),
     ],
 )
 def test_another_size_is_explained(size, said):

@@ -10,7 +10,8 @@ from airborne.calibration.diagnosis.control_points import (
     decompose_cameras,
     find_outliers,
     flatness,
+    is_turned,
 )
 from airborne.cameras.finding import Finding
 
-__all__ = ["Finding", "check_points", "check_solutions", "decompose_cameras", "find_outliers", "flatness"]
+__all__ = ["Finding", "check_points", "check_solutions", "decompose_cameras", "find_outliers", "flatness", "is_turned"]

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.special import fdtrc
 
+from airborne.calibration.diagnosis.image_geometry import (
+    NOT_SQUARE,
+    check_alike,
+    check_image,
+    excludes_square_pixels,
+    is_straight,
+)
 from airborne.calibration.intrinsics.model_selection import Solution, leave_one_out
 from airborne.calibration.intrinsics.physical import fit_pinhole
 from airborne.calibration.sources.control_points import ControlPoints
@@ -15,34 +24,34 @@ from airborne.cameras.clicks import refuse_same_clicks
 from airborne.cameras.dlt import FEWEST_DLT_POINTS, Decomposition, decompose, fit_dlt
 from airborne.cameras.finding import Finding, join_names
 from airborne.errors import CalibrationError, count
-from airborne.geometry.triangulation import px_from_points
-from airborne.types import Array
+from airborne.types import Array, Size
+from airborne.video.sizes import lines_of_scale
 
 _FLAT_ERROR, _FLAT_WARNING = 0.01, 0.1  # thickness over extent of the points that one camera sees
 # of the control points: beyond it an error, a warning: the unit is wrong
 _LARGEST_EXTENT_M, _LARGE_EXTENT_M = 500.0, 100.0
+_SMALL_EXTENT_M = 0.2  # chosen: of a scene that may be meant
+_UNITS = ((0.01, "cm (divide by 100)"), (0.001, "mm (divide by 1000)"), (0.0254, "inches (multiply by 0.0254)"))
 _ROUGH_FIT_PX = 3.0  # careful clicks give about one pixel
-_BENT = 3.0  # times a model's residuals: what the direct linear transformation may leave of a straight lens
-_OFF_CENTRE = 0.15  # of the image's diagonal
-_NOT_SQUARE = 0.03  # relative difference of the focal lengths that is reported
 _MOST_STRETCH = 2.0  # chosen: of an axis of the points, either way, that is tried
+_FACTORS = tuple(Fraction(each) for each in ("4/3", "3/2", "2", "8/3", "3", "4"))  # by which videos are reduced
+_REDUCED = 0.25  # chosen: share of a camera's points that lie outside an image that is too small by 4/3, 0.44 evenly
 _FAR = 50.0  # chosen: times the others' distance from their median; in millimetres a point is 1000 times as far
-_MOST_ROLL = np.radians(60)  # about the optical axis: cameras stand roughly upright
 _SIGNIFICANCE = 1e-4  # of rejecting a point of a good set
 _MOST_OUTLIERS = 3  # named for each camera
 
 
-def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) -> None:
+def check_points(points: ControlPoints, sizes: Mapping[str, Size]) -> None:
     """Raise CalibrationError where a camera cannot be estimated: size, number, unit, image borders, flatness."""
     missing = [camera for camera in points.cameras if camera not in sizes]
     if missing:
         raise CalibrationError(f"no image size for camera '{missing[0]}'; sizes are given for: {', '.join(sizes)}")
     refuse_same_clicks("the control points", points.cameras, points.px)
-    extent = np.linalg.norm(np.ptp(points.world, axis=0))
+    extent = float(np.linalg.norm(np.ptp(points.world, axis=0)))
     if extent > _LARGEST_EXTENT_M:
         _refuse_far_points(points)
         raise CalibrationError(
-            f"the control points span {extent:.0f} m, expected a scene in metres: divide by 1000 if they are in mm"
+            f"the control points span {extent:.0f} m, expected a scene in metres: {_other_units(extent)}"
         )
     for camera in points.cameras:
         is_seen = points.is_seen_by(camera)
@@ -51,7 +60,7 @@ def check_points(points: ControlPoints, sizes: Mapping[str, tuple[int, int]]) ->
                 f"camera '{camera}' sees {is_seen.sum()} control points, at least {FEWEST_DLT_POINTS} are needed: "
                 "click more"
             )
-        _check_inside(points, camera, sizes[camera])
+        _check_inside(points, camera, sizes)
         ratio = flatness(points.world[is_seen])
         if ratio < _FLAT_ERROR:
             raise CalibrationError(
@@ -70,27 +79,56 @@ def _refuse_far_points(points: ControlPoints) -> None:
         raise CalibrationError(
             f"{what} {from_middle[is_far].max():.0f} m from the others, which span "
             f"{np.linalg.norm(np.ptp(points.world[~is_far], axis=0)):.1f} m ({names}): correct x_m, y_m, z_m; divide "
-            "by 1000 what is in mm"
+            "by 100 what is in cm, by 1000 what is in mm"
         )
 
 
-def _check_inside(points: ControlPoints, camera: str, size: tuple[int, int]) -> None:
-    px = points.px[:, points.cameras.index(camera)]
-    upper = np.array(size) - 0.5
-    outside = (px < -0.5) | (px > upper)  # NaN compares as inside
+def _other_units(extent: float) -> str:
+    """Say what points that span `extent` would span in units that make a plausible scene of them."""
+    spans = [(share * extent, how) for share, how in _UNITS]
+    plausible = [f"{m:.2g} m if in {how}" for m, how in spans if _SMALL_EXTENT_M < m < _LARGE_EXTENT_M]
+    return f"they would span {', '.join(plausible)}" if plausible else "correct x_m, y_m, z_m"
+
+
+def _check_inside(points: ControlPoints, camera: str, sizes: Mapping[str, Size]) -> None:
+    px, size = points.px[:, points.cameras.index(camera)], sizes[camera]
+    outside = is_outside(px, size)
     if not outside.any():
         return
-    first = int(np.flatnonzero(outside.any(axis=1))[0])
-    n = int(outside.any(axis=1).sum())
+    first, n = int(np.flatnonzero(outside)[0]), int(outside.sum())
     what = (
         f"camera '{camera}': {count(n, 'control point')} outside its {size[0]}×{size[1]} image "
         f"(first '{points.names[first]}' at u={px[first, 0]:g}, v={px[first, 1]:g})"
     )
-    if not ((px < -0.5) | (px > upper[::-1])).any():
+    if is_turned(px, size):
         raise CalibrationError(
             f"{what}; with width and height exchanged they would fit: exchange those, or the columns u and v"
         )
-    raise CalibrationError(f"{what}: correct them, or the image size")
+    alike = points.px[:, [sizes[each] == size for each in points.cameras]].reshape(-1, 2)
+    factor = next((each for each in _FACTORS if not is_outside(alike, _times(size, each)).any()), None)
+    if factor is None or n < _REDUCED * np.isfinite(px[:, 0]).sum():  # else a few wrong clicks
+        raise CalibrationError(f"{what}: correct them, or the image size")
+    width, height = _times(size, factor)
+    raise CalibrationError(
+        f"{what}; they fit {width}×{height}, {float(factor):.4g} times the size, so they were probably clicked before "
+        f"the video was reduced: calibrate with --size {width}x{height}; in a trial of reduced videos give the result "
+        f"as file under [calibration], and under [[camera]] {lines_of_scale(float(factor))}"
+    )
+
+
+def is_outside(px: Array, size: Size) -> NDArray[np.bool_]:
+    """Say which of px (n, 2) lie outside an image; NaN does not."""
+    return np.any((px < -0.5) | (px > np.array(size) - 0.5), axis=1)
+
+
+def is_turned(px: Array, size: Size) -> bool:
+    """Say whether px (n, 2) lie outside an image, and inside it with width and height exchanged."""
+    width, height = size
+    return bool(is_outside(px, size).any() and not is_outside(px, (height, width)).any())
+
+
+def _times(size: Size, factor: Fraction) -> Size:
+    return round(size[0] * factor), round(size[1] * factor)
 
 
 def flatness(world: Array) -> float:
@@ -121,24 +159,29 @@ def decompose_cameras(points: ControlPoints) -> dict[str, Decomposition]:
 
 def check_solutions(
     points: ControlPoints,
-    sizes: Mapping[str, tuple[int, int]],
+    sizes: Mapping[str, Size],
     decompositions: Mapping[str, Decomposition],
+    candidates: Mapping[str, Sequence[Solution]],
     solutions: Mapping[str, Solution],
 ) -> tuple[Finding, ...]:
-    """Return what casts doubt on the calibration, each with its camera or point."""
+    """Return what casts doubt on the calibration, each with its camera or point; `candidates`: of all models tried."""
     findings = []
-    extent = np.linalg.norm(np.ptp(points.world, axis=0))
+    extent = float(np.linalg.norm(np.ptp(points.world, axis=0)))
     if extent > _LARGE_EXTENT_M:
         what = f"the control points span {extent:.0f} m"
-        findings.append(Finding(kind="units", what=what, advice="are they in metres?"))
-    stretched = list(_check_stretch([decompositions[name] for name in points.cameras]))
+        findings.append(Finding(kind="units", what=what, advice=f"are they in metres? {_other_units(extent)}"))
+    stretched = list(_check_stretch(decompositions, candidates))
     findings += stretched
+    alike = check_alike(sizes, candidates)
+    findings += alike
+    known = {("off centre", name) for each in alike for name in each.cameras}
+    known |= {("squeezed", name) for name in points.cameras if stretched}
     outliers = {camera: find_outliers(solutions[camera]) for camera in points.cameras}
     findings += _check_outliers(points, outliers)
     for camera in points.cameras:
-        if _is_straight(solutions[camera]):  # else the decomposition says little
-            found = _check_image(camera, sizes[camera], decompositions[camera])
-            findings += [each for each in found if each.kind != "squeezed" or not stretched]
+        if is_straight(solutions[camera]):  # else the decomposition says little
+            found = check_image(camera, sizes[camera], decompositions[camera], candidates[camera])
+            findings += [each for each in found if (each.kind, camera) not in known]
         ratio = flatness(solutions[camera].world)
         if ratio < _FLAT_WARNING:
             what = f"the control points of camera '{camera}' are nearly flat (thickness / extent {ratio:.3f})"
@@ -152,11 +195,14 @@ def check_solutions(
     return tuple(findings)
 
 
-def _check_stretch(cameras: Sequence[Decomposition]) -> Iterator[Finding]:
+def _check_stretch(
+    decompositions: Mapping[str, Decomposition], candidates: Mapping[str, Sequence[Solution]]
+) -> Iterator[Finding]:
     """Yield a finding where one axis of the points, stretched, explains pixels of several cameras that are not square.
 
     Where a table's axis is divided by s, a camera's K R has the column of that axis multiplied by s.
     """
+    cameras = list(decompositions.values())
 
     def log_ratios(log_stretch: float, axis: int) -> Array:
         columns = np.where(np.arange(3) == axis, np.exp(log_stretch), 1.0)
@@ -166,48 +212,17 @@ def _check_stretch(cameras: Sequence[Decomposition]) -> Iterator[Finding]:
     def misfit(log_stretch: float, axis: int) -> float:
         return float(np.sum(log_ratios(log_stretch, axis) ** 2))
 
-    if np.count_nonzero(np.abs(log_ratios(0.0, 0)) > _NOT_SQUARE) < 2:
+    is_squeezed = np.abs(log_ratios(0.0, 0)) > NOT_SQUARE
+    if sum(excludes_square_pixels(candidates[name]) for name in np.array([*decompositions])[is_squeezed]) < 2:
         return
     bounds = np.log(_MOST_STRETCH) * np.array([-1.0, 1.0])
     fits = [minimize_scalar(misfit, bounds=bounds, method="bounded", args=(axis,)) for axis in range(3)]
     axis = int(np.argmin([fit.fun for fit in fits]))
     found = float(fits[axis].x)
-    if np.abs(log_ratios(found, axis)).max() < _NOT_SQUARE < abs(found):
+    if np.abs(log_ratios(found, axis)).max() < NOT_SQUARE < abs(found):
         name = f"{'xyz'[axis]}_m"
         what = f"with {name} multiplied by {np.exp(-found):.2f}, the pixels of all cameras would be square"
         yield Finding(kind="stretched", what=what, advice=f"check the points' {name}")
-
-
-def _is_straight(solution: Solution) -> bool:
-    """Say whether the direct linear transformation, which knows no lens, fits about as well as the chosen model."""
-    P = fit_dlt(solution.world, solution.px)
-    rms_px = np.sqrt(np.mean(np.sum((px_from_points(P[None], solution.world)[:, 0] - solution.px) ** 2, axis=1)))
-    return bool(rms_px < _BENT * np.sqrt(np.mean(np.sum(solution.residual_px**2, axis=1))))
-
-
-def _check_image(camera: str, size: tuple[int, int], decomposition: Decomposition) -> Iterator[Finding]:
-    K, R = decomposition.K, decomposition.R
-    middle = (np.array(size) - 1) / 2
-    if np.linalg.norm(K[:2, 2] - middle) > _OFF_CENTRE * np.hypot(*size):
-        yield Finding(
-            kind="off centre",
-            what=f"camera '{camera}' looks through pixel ({K[0, 2]:.0f}, {K[1, 2]:.0f}), expected near the middle "
-            f"({middle[0]:.0f}, {middle[1]:.0f})",
-            advice=f"is {size[0]}×{size[1]} its size, or is the image cropped?",
-            cameras=(camera,),
-        )
-    if abs(K[0, 0] / K[1, 1] - 1) > _NOT_SQUARE:
-        yield Finding(
-            kind="squeezed",
-            what=f"camera '{camera}' seems to have pixels that are not square (focal lengths {K[0, 0]:.0f} and "
-            f"{K[1, 1]:.0f} px)",
-            advice="resample its image to square pixels",
-            cameras=(camera,),
-        )
-    level = np.hypot(R[2, 0], R[2, 1])
-    if level > 0.5 and -R[1, 2] / level < np.cos(_MOST_ROLL):
-        what = f"camera '{camera}' comes out on its side or upside down"
-        yield Finding(kind="turned", what=what, advice="is world z up?", cameras=(camera,))
 
 
 def find_outliers(solution: Solution) -> dict[int, float]:

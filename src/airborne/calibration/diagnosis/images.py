@@ -97,7 +97,8 @@ def check_image_size(camera: str, calibrated: tuple[int, int], picture: tuple[in
     else:
         kind, advice = (
             "size",
-            "it was cropped (give saved_offset_px), or the camera has another mode",
+            "it was cropped (give saved_offset_px, and saved_scale if it was resized too), or the camera has another "
+            "mode",
         )
     what = (
         f"{camera} was calibrated with images of {calibrated[0]}×{calibrated[1]}, these have {picture[0]}×{picture[1]}"

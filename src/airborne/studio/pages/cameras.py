@@ -213,9 +213,9 @@ def _describe(camera: Camera, sd: Mapping[str, float]) -> str:
 def _with_sd(value: float, sd: float | None, digits: int) -> str:
     """Write a number, with two digits of its standard deviation."""
     if not sd:
-        return f"{value:.{digits}f}"
+        return f"{value:z.{digits}f}"
     digits = max(0, 1 - math.floor(math.log10(sd)))
-    return f"{value:.{digits}f} ± {sd:.{digits}f}"
+    return f"{value:z.{digits}f} ± {sd:.{digits}f}"
 
 
 def _show_rig(rig: Rig, findings: Mapping[str, Sequence[str]], deviations: Mapping[str, Mapping[str, float]]) -> None:
