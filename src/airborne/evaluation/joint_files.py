@@ -20,7 +20,7 @@ _METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _PAIRED = {name: name for name in ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "hand")}
 _PAIRED |= {"bigtoe": "foot", "footindex": "foot"}
-_SINGLE = {name: name for name in ("pelvis", "torso", "neck", "head")}
+_SINGLE = {name: name for name in ("pelvis", "torso", "neck")}
 _SINGLE |= {"hip": "pelvis", "midhip": "pelvis", "chip": "pelvis"}
 
 
@@ -42,8 +42,11 @@ def read_joint_paths(path: Path) -> JointPaths:
 def landmark_of(marker: str) -> str | None:
     """Return the landmark for a pose network's keypoint name (RHip, left_hip, hip_left, RBigToe), or None.
 
-    Handles the names of HALPE, BODY_25, COCO and BlazePose. The big toe stands for the ball of the foot.
+    Handles the names of HALPE, BODY_25, COCO and BlazePose. The big toe stands for the ball of the foot. The landmark
+    `head` lies between the ears; networks' Head is the top of it.
     """
+    if marker == "head":
+        return marker
     words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", marker)]
     sides = [_SIDES[word] for word in words if word in _SIDES]
     stem = "".join(word for word in words if word not in _SIDES)
