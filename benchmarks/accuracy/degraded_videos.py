@@ -1,8 +1,8 @@
 """How right the stated deviations of a thrown thing are where its videos are bad: errors within two of them.
 
 `python benchmarks/accuracy/degraded_videos.py [--quick] [--seeds 7201 ...]`: throws, calibrated from control points,
-interlaced and not, whose videos are compressed to a twentieth, out of focus, noisy, shaken, half hidden, or change in
-brightness. The tracker is told nothing of that. Of each kind the mean over the throws.
+interlaced and not, whose pictures, or each field of them, are compressed to a twentieth, out of focus, noisy, shaken,
+half hidden, or change in brightness. The tracker is told nothing of that. Of each kind the mean over the throws.
 """
 
 from __future__ import annotations
@@ -45,6 +45,12 @@ _FLOOR = "88..99"  # of errors within two sds
 _RNG = np.random.default_rng(0)
 
 
+def _defocused(image: Array, number: int) -> Array:
+    height, width = image.shape[:2]
+    rows = 2.5 * (0.5 if width > 2 * height else 1.0)  # a field has half of the rows
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), 2.5, sigmaY=rows), float)
+
+
 def _hidden(image: Array, number: int) -> Array:
     image, middle = image.copy(), image.shape[1] // 2
     image[:, middle - 12 : middle + 12] = 60
@@ -58,10 +64,10 @@ def _crossed(image: Array, number: int) -> Array:
     return image
 
 
-_KINDS: dict[str, tuple[Callable[[Array, int], Array], int]] = {  # of an image and its number, and how it is coded
+_KINDS: dict[str, tuple[Callable[[Array, int], Array], int]] = {  # of a picture and its number, and how it is coded
     "as they were": (lambda image, number: image, _FINE_CRF),
     "compressed": (lambda image, number: image, _COARSE_CRF),
-    "out of focus": (lambda image, number: np.asarray(cv2.GaussianBlur(image, (0, 0), 2.5), float), _FINE_CRF),
+    "out of focus": (_defocused, _FINE_CRF),
     "noisy": (lambda image, number: image + _RNG.normal(0, 15, image.shape), _FINE_CRF),
     "shaken": (lambda image, number: np.roll(image, (int(3 * np.sin(number)), number % 3), (0, 1)), _FINE_CRF),
     "half hidden": (_hidden, _FINE_CRF),
@@ -124,7 +130,11 @@ def _degrade(video: VideoSource, target: Path, kind: str) -> None:
     facts, fields = inspect(woven), "progressive" if video.fields == "auto" else video.fields
     with VideoWriter(target, size=facts.size, rate=facts.image_rate, fields=fields, crf=crf) as writer:
         for number, picture in enumerate(decode(woven, facts)):
-            image = change(rgb_from_decoded(picture, facts).astype(np.float32), number)
+            image = rgb_from_decoded(picture, facts).astype(np.float32)
+            if fields == "progressive":
+                image = change(image, number)
+            else:  # what a lens or a lamp does, it does to each field
+                image[::2], image[1::2] = (change(image[parity::2], number) for parity in (0, 1))
             writer.write(np.clip(image, 0, 255).astype(np.uint8))
 
 
