@@ -197,7 +197,8 @@ def _describe(summary: dict, output: Path) -> str:
         said_above = list(players_warnings(summary))
         lines += players_summary(summary)
         if n == summary["n_lost"]:
-            lines.append(f"no player was found in any frame: {look_and}correct [[start.player]], or let `airborne find` look for them")
+            mend = "correct [[start.player]], or let `airborne find` look for them"
+            lines.append(f"no player was found in any frame: {look_and}{mend}")
     elif summary["n_frames"] == summary["n_lost"]:
         lines.append(f"the body was found in no frame: {look_and}correct [start]")
     else:
