@@ -7,19 +7,22 @@ focus (sd 2.5 px) were 3.3 mm off without this, and are 1.6; those compressed to
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.appearance.model import LENS_BLURS_PX, Appearance, Region
 from airborne.body import Pose
 from airborne.tracking.image_regions import narrow_regions
 from airborne.tracking.model_based.exposure import Exposure, Extrapolation, bodies_in_exposure
 from airborne.tracking.model_based.gauss_newton import weigh_image
-from airborne.tracking.model_based.image_views import image_views, with_lens_blur
+from airborne.tracking.model_based.image_views import ImageView, image_views, with_lens_blur
 from airborne.tracking.model_based.learned_regions import MARGIN_PX
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
+
+_USUAL_PX = 0.8  # of sharp images: what is tried first
 
 
 def learn_blurs(
@@ -37,8 +40,24 @@ def learn_blurs(
         if motion is not None and len(bodies_in_exposure(render_model, pose, motion, exposure)) > 1:
             continue
         (image,) = image_views(render_model, [region], known)
-        images = [with_lens_blur(image, region, blur_px) for blur_px in LENS_BLURS_PX]
-        appearance = appearance.learn_blur(
-            region, np.array([weigh_image(render_model, posed, each) for each in images])
-        )
+        start = LENS_BLURS_PX.index(appearance.blur_px(region) or _USUAL_PX)
+
+        def cost(at: int, image: ImageView = image, region: Region = region) -> float:
+            return weigh_image(render_model, posed, with_lens_blur(image, region, LENS_BLURS_PX[at]))
+
+        appearance = appearance.learn_blur(region, _descend(cost, start, len(LENS_BLURS_PX)))
     return appearance
+
+
+def _descend(cost: Callable[[int], float], start: int, n: int) -> NDArray[np.float64]:
+    """Return the costs (n,) on the way from one down to where both neighbours cost more; infinite where not tried."""
+    costs: NDArray[np.float64] = np.full(n, np.inf)
+    best = start
+    costs[best] = cost(best)
+    for step in (1, -1):
+        while 0 <= best + step < n and np.isinf(costs[best + step]):
+            costs[best + step] = cost(best + step)
+            if costs[best + step] > costs[best]:
+                break
+            best += step
+    return costs
