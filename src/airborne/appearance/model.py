@@ -104,7 +104,7 @@ class Appearance:
         return background.crop(region.corner, region.rgb.shape[:2])
 
     def learn_blur(self, region: Region, costs: NDArray[np.float64]) -> Appearance:
-        """Learn how sharp a camera is from what its image costs with each of LENS_BLURS_PX: (k,); infinite: not tried."""
+        """Learn how sharp a camera is from the costs of its image with each of LENS_BLURS_PX: (k,), inf: not tried."""
         name = region.camera.name
         return replace(self, blur_costs={**self.blur_costs, name: self.blur_costs.get(name, 0.0) + costs})
 
