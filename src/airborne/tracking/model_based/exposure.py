@@ -43,7 +43,7 @@ def fit_exposed(render_model: RenderModel, fit: Fit, motion: Extrapolation) -> F
     """Fit again to what the images would show if the body had stood while they were exposed."""
     seen, pose = fit.views, fit.pose
     for _ in range(_ROUNDS):
-        views = _still_images(render_model, seen, pose, motion)
+        views = still_images(render_model, seen, pose, motion)
         if views is None:
             return fit
         fit = fit_images(render_model, [pose], views, dofs=fit.dofs, prior=fit.prior)
@@ -51,7 +51,7 @@ def fit_exposed(render_model: RenderModel, fit: Fit, motion: Extrapolation) -> F
     return replace(fit, pose=pose)
 
 
-def _still_images(
+def still_images(
     render_model: RenderModel, images: Sequence[ImageView], pose: Pose, motion: Extrapolation
 ) -> list[ImageView] | None:
     """Return the images as they would be if the body had stood at a pose; None where it hardly moves in any."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from airborne.appearance.model import LENS_BLURS_PX, Appearance, Region
 from airborne.body import Pose
 from airborne.tracking.image_regions import narrow_regions
-from airborne.tracking.model_based.exposure import Exposure, Extrapolation, bodies_in_exposure
+from airborne.tracking.model_based.exposure import Extrapolation, still_images
 from airborne.tracking.model_based.gauss_newton import weigh_image
 from airborne.tracking.model_based.image_views import ImageView, image_views, with_lens_blur
 from airborne.tracking.model_based.learned_regions import MARGIN_PX
@@ -32,14 +32,16 @@ def learn_blurs(
     appearance: Appearance,
     motion: Extrapolation | None = None,
 ) -> Appearance:
-    """Learn how sharp the cameras' images are from regions that show a body, but not where its motion blurs them."""
+    """Learn how sharp the cameras are from regions that show a body, as if it had stood while they were exposed."""
     posed = render_model.with_pose(pose)
     known = learn_missing_backgrounds(render_model, posed, regions, appearance)
     for region in narrow_regions(regions, [posed], render_model.geometry, MARGIN_PX):
-        exposure = Exposure(region.view.exposure_s, region.packed_view, region.camera.K)
-        if motion is not None and len(bodies_in_exposure(render_model, pose, motion, exposure)) > 1:
+        if region.view.exposure_s and motion is None:
             continue
         (image,) = image_views(render_model, [region], known)
+        if motion is not None and region.view.exposure_s:
+            weigh_image(render_model, posed, image)  # fits its light
+            (image,) = still_images(render_model, [image], pose, motion) or [image]
         start = LENS_BLURS_PX.index(appearance.blur_px(region) or _USUAL_PX)
 
         def cost(at: int, image: ImageView = image, region: Region = region) -> float:

@@ -132,7 +132,7 @@ class RefinedTracker:
             backgrounds=turn == 0 or not is_steady,
         )
         if state.n_learned < _BLUR_FRAMES and not self.moves_joints:
-            appearance = learn_blurs(self.render_model, estimate.pose, regions, appearance, motion)
+            appearance = learn_blurs(self.render_model, estimate.pose, regions, appearance, motion if before else None)
         if not state.past:  # nothing was known of colours before
             shares = self._mask_shares(estimate.pose, regions, appearance)
         reference = state.reference.update(*shares) if shares else state.reference
