@@ -14,9 +14,9 @@ from airborne.cameras.finding import Finding, join_names
 from airborne.geometry.triangulation import px_from_points
 from airborne.types import Array, Size
 
-NOT_SQUARE = 0.03  # relative difference of the focal lengths that is reported
-_BENT = 3.0  # times a model's residuals: what the direct linear transformation may leave of a straight lens
-_OFF_CENTRE = 0.15  # of the image's diagonal, of one camera
+NOT_SQUARE = 0.03  # chosen: relative difference of the focal lengths that is reported
+_BENT = 3.0  # chosen: times a model's residuals: what the direct linear transformation may leave of a straight lens
+_OFF_CENTRE = 0.15  # chosen: of the image's diagonal, of one camera
 # of the diagonal; chi-square of that, over the scatter's where this is above 1; and the scatter's for each degree of
 # freedom: of cameras that lie off alike. Chosen on 172 sets of synthetic points, 8 to 24 for two to four cameras, 1 px
 # of noise; of 174 other sets none is reported at the right size, 117 at one off by 9 % of the diagonal, 153 by 12 %

@@ -13,7 +13,7 @@ from airborne.motion.jumps.leg_track import LegTrack
 from airborne.motion.local_polynomials import N_DRAWS
 from airborne.types import Array
 
-WINDOW_S, NEAR_S = 0.25, 5.0  # of standing still; of the flight: where it is sought
+WINDOW_S, NEAR_S = 0.25, 5.0  # chosen: of standing still; of the flight: where it is sought
 _QUIET_M_S = 0.15  # of hips and ankles, at most
 _STRAIGHT = 0.98  # hip-ankle distance in leg lengths: a knee flexed by no more than 20 degrees
 _LEG_SHARE, _LEG_SHARE_SD = 0.985, 0.01  # standing height of hips over ankles, in leg lengths

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from airborne.constants import GRAVITY_M_S2
+from airborne.tracking.self_check.path import alarm
 from airborne.types import Array
 
 _LEAST_MOMENTS, _LEAST_S = 7, 0.25  # of a flight that is measured
@@ -30,14 +31,8 @@ class WrongFall(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `self_check` in summary.json holds: an alarm, its value above 9.81 m/s2."""
-        return {
-            "subject": "fall",
-            "kind": "gravity_m_s2",
-            "value": self.gravity_m_s2 - GRAVITY_M_S2,
-            "sd": self.gravity_sd_m_s2,
-            "is_alarm": True,
-            "sentence": self.sentence,
-        }
+        value, sd = self.gravity_m_s2 - GRAVITY_M_S2, self.gravity_sd_m_s2
+        return alarm("fall", "gravity_m_s2", value=value, sd=sd, sentence=self.sentence)
 
 
 class _Parabola(NamedTuple):

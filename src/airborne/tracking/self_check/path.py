@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,11 @@ from numpy.typing import NDArray
 from airborne.body import Pose
 from airborne.body.chain import delta_between, move_pose
 from airborne.types import Array
+
+
+def alarm(subject: str, kind: str, *, value: float, sd: float, sentence: str) -> dict[str, Any]:
+    """Return what `self_check` in summary.json holds of something wrong that a path shows."""
+    return {"subject": subject, "kind": kind, "value": value, "sd": sd, "is_alarm": True, "sentence": sentence}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

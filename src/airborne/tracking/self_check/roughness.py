@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from airborne.geometry.sampling import chi2_quantile
-from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.path import TrackedPath, alarm
 from airborne.types import Array
 
 # (frames on either side, degree) of the polynomials that a path is compared with. Chosen on five synthetic throws, the
@@ -38,14 +38,7 @@ class PathFinding(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `self_check` in summary.json holds: an alarm."""
-        return {
-            "subject": "path",
-            "kind": self.kind,
-            "value": self.value,
-            "sd": 0.0,
-            "is_alarm": True,
-            "sentence": self.sentence,
-        }
+        return alarm("path", self.kind, value=self.value, sd=0.0, sentence=self.sentence)
 
 
 def find_wrong_path(path: TrackedPath, rough: Array) -> PathFinding | None:
