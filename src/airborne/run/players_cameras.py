@@ -12,6 +12,7 @@ from airborne.tracking import Status
 from airborne.tracking.camera_lags import solve_lags
 from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, moment_of
 from airborne.tracking.capsules.occlusion import shows_player
+from airborne.tracking.capsules.track import CameraShift
 from airborne.tracking.players import PlayersStep
 from airborne.video import Frames
 
@@ -24,6 +25,35 @@ _HARDLY, _MOSTLY = 0.15, 0.5
 _LEAST_S = 0.003  # chosen: a body at 10 m/s moves 3 cm, as much as a joint is off
 
 
+class _Shifted:
+    """When a camera, or one of several, was shifted, and how far at some of these times."""
+
+    def __init__(self, first_s: float) -> None:
+        self.first_s, self.last_s, self.n_times = first_s, first_s, 0
+        self.shifts: EvenSample[CameraShift] = EvenSample(_MOST_MOMENTS)
+
+    def add(self, time_s: float, shift: CameraShift) -> None:
+        """Keep a time, in their order."""
+        self.last_s, self.n_times = time_s, self.n_times + 1
+        self.shifts.offer(lambda: shift)
+
+    def describe(self, names: Sequence[str], n_times: int) -> str:
+        """Say it of a run of so many times."""
+        when = f"from {self.first_s:.2f} to {self.last_s:.2f} s, in {self.n_times} of {n_times} frames"
+        if len(names) > 1:
+            return (
+                f"self-check: {' or '.join(names)} was moved, or its calibration is wrong: the cameras disagree where "
+                f"the players are {when}, and joints are uncertain there; look which of them shows something else"
+            )
+        right, down = (float(np.median(each)) for each in zip(*(each[1:3] for each in self.shifts), strict=True))
+        ways = (abs(right), "right of" if right > 0 else "left of"), (abs(down), "below" if down > 0 else "above")
+        where = " and ".join(f"{px:.0f} px {way}" for px, way in ways if px >= 0.5)
+        return (
+            f"self-check: {names[0]} shows the players {where} where the other cameras see them {when}, and is left "
+            "out there: was it moved, or is its calibration another's?"
+        )
+
+
 class CameraCheck:
     """What cameras say of the players at some moments of a run, spread evenly over it, and how often they show them."""
 
@@ -32,16 +62,21 @@ class CameraCheck:
         self._n_times = 0
         self._n_found: Counter[int] = Counter()  # by camera: players found while it had an image
         self._n_shown: Counter[int] = Counter()  # and those of them that it shows
+        self._shifted: dict[tuple[int, ...], _Shifted] = {}  # by camera, or by those of which one was shifted
 
     def add(self, frames: Frames, step: PlayersStep) -> None:
         """Keep a time of the tracker `Blocker`, or not."""
         self._n_times += 1
+        registration, time_s = step.state.registration, float(frames.time_s)
+        if registration.shift is not None and np.isfinite(registration.shift.right_px):
+            suspects = tuple(sorted(view for view in registration.suspects if view is not None))
+            self._shifted.setdefault(suspects, _Shifted(time_s)).add(time_s, registration.shift)
         found = [each for each in step.players if each.status is not Status.LOST]
         for each in found:
             is_shown = shows_player(step.state.players[each.player].colours.occlusion)
             seeing = [i for i, view in enumerate(frames.views) if view is not None]
             self._n_found.update(seeing)
-            self._n_shown.update(i for i in seeing if is_shown[i])
+            self._n_shown.update(i for i in seeing if is_shown[i] and i != registration.left_out)
         for each in found if self._n_times % _EVERY == 0 else ():
             self._moments[each.player].offer(lambda name=each.player: moment_of(step.state, name, frames))
 
@@ -49,8 +84,16 @@ class CameraCheck:
         """Say which cameras are wrong; `names` are the rig's, whose first one is the clock.
 
         Of times nothing is said where a camera hardly agrees with the others: it moves what these are compared with.
+        One that is late shows the players elsewhere too, where they move.
         """
-        return self._describe_shown(names) or self._describe_times(names)
+        if hidden := self._describe_shown(names):
+            return self._describe_shifts(names) or hidden
+        return self._describe_times(names) or self._describe_shifts(names)
+
+    def _describe_shifts(self, names: Sequence[str]) -> list[str]:
+        """Say of each camera, or of those that may be meant, when and how far it is shifted."""
+        most_first = sorted(self._shifted.items(), key=lambda each: -each[1].n_times)
+        return [found.describe([names[view] for view in suspects], self._n_times) for suspects, found in most_first]
 
     def _describe_shown(self, names: Sequence[str]) -> list[str]:
         shares = {names[i]: self._n_shown[i] / n for i, n in sorted(self._n_found.items())}

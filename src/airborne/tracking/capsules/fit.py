@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -89,7 +90,7 @@ def fit_jumper(
     anchors = np.full((N_POINTS, 3), np.nan) if prior.anchors is None else prior.anchors
     sd_m = np.ones(N_POINTS) if prior.anchor_sd_m is None else prior.anchor_sd_m
     priors = _Priors(prior.mean, np.ascontiguousarray(prior.information), anchors, sd_m, POSTURE_INFORMATION)
-    weight = _pixel_weight(region_maps)
+    weight = pixel_weight(region_maps)
     best = _maximise(
         _allocate_iterate(state, n, owned), _allocate_iterate(state, n, owned), priors, images, weight, most_steps
     )
@@ -110,25 +111,30 @@ def fit_jumper(
 def evidence_of(state: Array, region_maps: RegionMaps, others: Capsules) -> float:
     """Return the evidence of a state [nat], without any prior."""
     images, owned = _images(region_maps, others)
-    return _pixel_weight(region_maps) * accumulate_equations(state, 0, images, owned, Equations.of(N_POINTS, 0))
+    return pixel_weight(region_maps) * accumulate_equations(state, 0, images, owned, Equations.of(N_POINTS, 0))
 
 
 def view_equations(state: Array, region_maps: RegionMaps, others: Capsules, n: int) -> tuple[Array, Array]:
     """Return what each view alone says of a state's first n numbers: information (v, n, n), gradient (v, n) [nat]."""
-    weight, v = _pixel_weight(region_maps), len(region_maps.cameras)
+    weight, v = pixel_weight(region_maps), len(region_maps.cameras)
     information, gradient = np.zeros((v, n, n)), np.zeros((v, n))
     for k in range(v):
-        one = replace(
-            region_maps,
-            cameras=region_maps.cameras[k : k + 1],
-            sums=region_maps.sums[k : k + 1],
-            contrast=region_maps.contrast[k : k + 1],
-        )
-        images, owned = _images(one, others)
+        images, owned = _images(select_views(region_maps, [k]), others)
         equations = Equations.of(N_POINTS, n)
         accumulate_equations(state, n, images, owned, equations)
         information[k], gradient[k] = weight * _SLOPE * equations.curvature, weight * equations.gradient
     return information, gradient
+
+
+def select_views(region_maps: RegionMaps, which: Sequence[int]) -> RegionMaps:
+    """Return the maps of some of the regions."""
+    rows = list(which)
+    return replace(
+        region_maps,
+        cameras=region_maps.cameras[rows],
+        sums=region_maps.sums[rows],
+        contrast=region_maps.contrast[rows],
+    )
 
 
 def _images(region_maps: RegionMaps, others: Capsules) -> tuple[Images, Array]:
@@ -139,7 +145,8 @@ def _images(region_maps: RegionMaps, others: Capsules) -> tuple[Images, Array]:
     return images, np.zeros((v, n, 2, 2))
 
 
-def _pixel_weight(region_maps: RegionMaps) -> float:
+def pixel_weight(region_maps: RegionMaps) -> float:
+    """Return the weight of a pixel of the maps per nat of its evidence."""
     return _NATS_PER_M2 / region_maps.scale.px_per_m**2
 
 

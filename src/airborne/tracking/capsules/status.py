@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from airborne.tracking.capsules.dynamics import N_FREE
@@ -11,7 +13,7 @@ from airborne.tracking.capsules.fit import JumperFit
 from airborne.tracking.capsules.jumper import N_DOF, PELVIS
 from airborne.tracking.capsules.track import Track, evidence_per_px
 from airborne.tracking.capsules.unseen_legs import find_unseen_legs, unmeasured_covariance
-from airborne.tracking.estimate import Status
+from airborne.tracking.estimate import Status, worst_status
 from airborne.tracking.players import PlayerEstimate
 from airborne.types import Array
 from airborne.video import Frames
@@ -35,10 +37,9 @@ def estimate_player(name: str, frames: Frames, track: Track, *, fitted: JumperFi
     length_jacobian = _length_jacobian(fitted.state)
     covariance += length_jacobian @ track.shape_covariance @ length_jacobian.swapaxes(1, 2)
     covariance += unmeasured_covariance(fitted, track.reference_evidence)
-    sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 3)
     score = evidence_per_px(fitted.owned)
     is_seen = n_views >= 2 and score >= _LEAST_SHARE * track.reference_evidence
-    is_tracked = is_seen & (sd < UNCERTAIN_SD_M)
+    is_tracked = is_seen & (_sd(covariance) < UNCERTAIN_SD_M)
     for leg in find_unseen_legs(fitted.owned, track.reference_evidence):
         is_tracked[[2 + leg, 4 + leg, 6 + leg]] = False  # knee, ankle and foot
     return PlayerEstimate(
@@ -51,6 +52,22 @@ def estimate_player(name: str, frames: Frames, track: Track, *, fitted: JumperFi
         score=score,
         n_views=n_views,
     )
+
+
+def widen(estimate: PlayerEstimate, covariance: Array) -> PlayerEstimate:
+    """Add covariances (9, 3, 3) [m²] to those of an estimate's points; whose sd is large then is not tracked."""
+    widened = estimate.covariance + covariance
+    is_wide = _sd(widened) >= UNCERTAIN_SD_M
+    status = (
+        worst_status([each, Status.UNCERTAIN]) if wide else each
+        for each, wide in zip(estimate.joint_status, is_wide, strict=True)
+    )
+    return replace(estimate, covariance=widened, joint_status=tuple(status))
+
+
+def _sd(covariance: Array) -> Array:
+    """Return the sds of points, RMS over the axes."""
+    return np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 3)
 
 
 def _length_jacobian(state: Array) -> Array:

@@ -49,12 +49,46 @@ class Track:
     is_unclear: bool = False  # that look left open who is meant, which was said
 
 
+class CameraShift(NamedTuple):
+    """A camera that shows the players beside where the other cameras see them."""
+
+    view: int
+    right_px: float
+    down_px: float
+    or_view: int | None  # another camera that may be at fault instead
+
+
+class Registration(NamedTuple):
+    """What the last look at the cameras said."""
+
+    looked_s: Fraction | None = None
+    n_doubts: int = 0  # images that did not show a player then, and players who fitted badly
+    shift: CameraShift | None = None
+    covariance: Mapping[str, Array] = {}  # of each player's points (9, 3, 3) [m²], where it is open who is at fault
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a camera is shifted of which it is not known which it is."""
+        return self.shift is not None and self.shift.or_view is not None
+
+    @property
+    def suspects(self) -> tuple[int | None, ...]:
+        """The cameras that may be shifted."""
+        return () if self.shift is None else (self.shift.view, self.shift.or_view)
+
+    @property
+    def left_out(self) -> int | None:
+        """The camera that is left out: one that is clearly shifted."""
+        return None if self.shift is None or self.is_open else self.shift.view
+
+
 class Everybody(NamedTuple):
     """Who is followed: the players, by name, and others who may hide them."""
 
     players: Mapping[str, Track]
     bystanders: tuple[Track, ...] = ()
     looked_s: Fraction = Fraction(0)  # when others were looked for
+    registration: Registration = Registration()  # of the cameras
 
 
 def evidence_per_px(owned: Array) -> float:

@@ -32,7 +32,8 @@ from airborne.tracking.capsules.jumper import FOOT_HEIGHT_M, JOINTS, N_DOF
 from airborne.tracking.capsules.kernel_arguments import Capsules
 from airborne.tracking.capsules.occlusion import count_unoccluded, evidence_tables, update_occlusion, with_occlusion
 from airborne.tracking.capsules.recovery import UNOCCLUDED, find_again, is_due
-from airborne.tracking.capsules.status import SHAPE, estimate_player
+from airborne.tracking.capsules.registration import check_registration
+from airborne.tracking.capsules.status import SHAPE, estimate_player, widen
 from airborne.tracking.capsules.surface_colours import (
     COLOUR_UPDATE_S,
     limit_occlusion,
@@ -71,7 +72,22 @@ class Blocker:
         return Everybody({})
 
     def step(self, state: Everybody, frames: Frames) -> tuple[Everybody, tuple[PlayerEstimate, ...]]:
-        """Track one time; raises TrialError where no image of the first frame shows a player."""
+        """Track one time; raises TrialError where no image of the first frame shows a player.
+
+        A camera that is clearly shifted is left out, and its image looked at again later.
+        """
+        after, estimates = self._follow(state, frames)
+        registration = check_registration(state, after, estimates, frames)
+        if registration.left_out != state.registration.left_out:
+            after, estimates = self._follow(state._replace(registration=registration), frames)
+        wide = registration.covariance
+        widened = (widen(each, wide[each.player]) if each.player in wide else each for each in estimates)
+        return after._replace(registration=registration), tuple(widened)
+
+    def _follow(self, state: Everybody, frames: Frames) -> tuple[Everybody, tuple[PlayerEstimate, ...]]:
+        """Track one time, without the camera that is left out."""
+        left_out = state.registration.left_out
+        frames = replace(frames, views=tuple(None if i == left_out else each for i, each in enumerate(frames.views)))
         if not state.players:
             return self._first(frames)
         tracks = [*state.players.values(), *state.bystanders]
