@@ -8,7 +8,7 @@ player: rows count the hips, knees and ankles that lie 0.15 m off or more, and t
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,16 +45,18 @@ def alterations(frames: Frames) -> Iterator[tuple[str, Frames]]:
         yield "without a camera", replace(frames, views=views)
 
 
-def follow(seed: int, difficulty: str) -> dict[str, list[tuple[float, bool, bool]]]:
+def follow(
+    seed: int, difficulty: str, alter: Callable[[Frames], Iterator[tuple[str, Frames]]], *, n_blockers: int = 1
+) -> dict[str, list[tuple[float, bool, bool]]]:
     """Track a scene in all its forms; return of each hip, knee and ankle its error [m], if it is held, if tracked."""
-    scene = block_scene(seed, difficulty=DIFFICULTIES[difficulty])
+    scene = block_scene(seed, n_blockers=n_blockers, difficulty=DIFFICULTIES[difficulty])
     paths = {player.name: true_joints(player, scene.times_s) for player in scene.blockers}
     truth = {name: np.stack([of[joint] for joint in LEG_POINTS], axis=1) for name, of in paths.items()}
     tracking = Blocker([PlayerStart(name=name, joints_m=at) for name, at in noisy_starts(scene).items()])
     states: list = []
     found: dict[str, list] = {}
     for k, frames in enumerate(block_frames(scene)):
-        altered = list(alterations(frames))
+        altered = list(alter(frames))
         states = states or [tracking.init() for _ in altered]
         for i, (name, each) in enumerate(altered):
             states[i], estimates = tracking.step(states[i], each)
@@ -69,27 +71,33 @@ def follow(seed: int, difficulty: str) -> dict[str, list[tuple[float, bool, bool
     return found
 
 
+def rows_of(found: dict[str, list[tuple[float, bool, bool]]], difficulty: str) -> list[dict]:
+    """Reduce what was found in each form."""
+    rows = []
+    for name, joints in found.items():
+        distance_m, is_held, is_tracked = map(np.array, zip(*joints, strict=True))
+        is_far = distance_m >= FAR_M
+        base = {"data": f"blocks, {difficulty}, {name}", "method": "blocker", "n": len(joints)}
+        rows += [
+            {**base, "metric": "mean joint error", "unit": "mm", "value": float(1e3 * distance_m.mean())},
+            {**base, "metric": "joints 150 mm off", "unit": "", "value": int(is_far.sum())},
+            {**base, "metric": "of them tracked", "unit": "", "value": int((is_far & is_tracked).sum()), "floor": "0"},
+            {**base, "metric": "joints tracked", "unit": "%", "value": float(100 * is_tracked.mean())},
+            {**base, "metric": "in the 95 % region", "unit": "%", "value": float(100 * is_held.mean()),
+             "floor": "88..99"},
+        ]  # fmt: skip
+    return rows
+
+
 def main(seeds: list[int]) -> None:
     """Track, reduce, append the rows."""
     rows = []
     for difficulty in ("default", "hard"):
         found: dict[str, list] = {}
         for seed in seeds:
-            for name, joints in follow(seed, difficulty).items():
+            for name, joints in follow(seed, difficulty, alterations).items():
                 found.setdefault(name, []).extend(joints)
-        for name, joints in found.items():
-            distance_m, is_held, is_tracked = map(np.array, zip(*joints, strict=True))
-            is_far = distance_m >= FAR_M
-            base = {"data": f"blocks, {difficulty}, {name}", "method": "blocker", "n": len(joints)}
-            rows += [
-                {**base, "metric": "mean joint error", "unit": "mm", "value": float(1e3 * distance_m.mean())},
-                {**base, "metric": "joints 150 mm off", "unit": "", "value": int(is_far.sum())},
-                {**base, "metric": "of them tracked", "unit": "", "value": int((is_far & is_tracked).sum()),
-                 "floor": "0"},
-                {**base, "metric": "joints tracked", "unit": "%", "value": float(100 * is_tracked.mean())},
-                {**base, "metric": "in the 95 % region", "unit": "%", "value": float(100 * is_held.mean()),
-                 "floor": "88..99"},
-            ]  # fmt: skip
+        rows += rows_of(found, difficulty)
     append("hidden_legs", rows)
 
 

@@ -146,6 +146,7 @@ def test_left_and_right_exchanged_is_noted():
     fit = fit_pose(MODEL, exchanged)
     assert fit.rms_m > 0.02
     assert fit.note is not None and fit.note.startswith("left and right look exchanged: landmarks ")
+    assert fit.is_exchanged
 
 
 @pytest.mark.parametrize(

@@ -172,6 +172,14 @@ def test_a_point_that_cannot_be_right_is_a_mistake_and_a_wrong_stature_a_doubt(t
     written = ", ".join(f"{name} = {place}" for name, place in small.items())
     result = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
     assert not result.mistakes and result.notes[0].endswith("; check the points and the body's size")
+    assert result.wrong_size is not None and abs(result.wrong_size.value + 0.15) < 2 * result.wrong_size.sd
+    assert result.notes[1].startswith("start.joints_m: the landmarks of the start are those of a body 15 ± 3 % smaller")
+
+
+def test_a_stature_that_is_right_is_not_doubted_by_landmarks_25_mm_off(trial):
+    off_m = np.random.default_rng(4).normal(scale=0.025 / np.sqrt(3), size=TRUE[0].shape)
+    written = ", ".join(f"{name} = {place}" for name, place in zip(NAMES, (TRUE[0] + off_m).tolist(), strict=True))
+    assert find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG).wrong_size is None
 
 
 def test_points_clicked_in_the_images(trial, tmp_path):

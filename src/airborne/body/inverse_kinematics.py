@@ -54,6 +54,7 @@ class PoseFit:
     residual_m: dict[str, float]  # landmark -> distance from its target [m]; NaN without a target
     rms_m: float  # over the landmarks with a target [m]
     note: str | None = None  # what looks wrong with the targets, in a line
+    is_exchanged: bool = False  # left and right of all of them
 
 
 def fit_pose(
@@ -83,12 +84,15 @@ def fit_pose(
     _check(problem, names, has_start=start is not None)
     pose, residual_m, rms_m = _fit(problem, start)
     is_suspect = seeks_swap and start is None and rms_m > _SUSPECT_M
-    note = _describe_exchange(problem) if is_suspect else None
-    return PoseFit(pose, dict(zip(names, residual_m.tolist(), strict=True)), rms_m, note)
+    note, is_exchanged = _find_exchange(problem) if is_suspect else (None, False)
+    return PoseFit(pose, dict(zip(names, residual_m.tolist(), strict=True)), rms_m, note, is_exchanged)
 
 
-def _describe_exchange(problem: LandmarkProblem) -> str | None:
-    """Say which landmarks fit clearly better with left and right exchanged, on a body with the targets' own lengths."""
+def _find_exchange(problem: LandmarkProblem) -> tuple[str | None, bool]:
+    """Say which landmarks fit clearly better with left and right exchanged, and whether it is all of them.
+
+    The body has the targets' own lengths.
+    """
     names = [landmark.name for landmark in problem.model.landmarks]
     try:
         lengths = fit_lengths(problem.model, problem.targets[None])
@@ -96,7 +100,7 @@ def _describe_exchange(problem: LandmarkProblem) -> str | None:
     except BodyError:  # lengths of no person
         pass
     if (as_named_m := _fit(problem, None)[2]) <= _SUSPECT_M:
-        return None
+        return None, False
     others_m = {}
     for words, stems in _EXCHANGED.items():
         is_of_pair = [name.rpartition("_")[0] in stems and other_side(name) in names for name in names]
@@ -108,11 +112,12 @@ def _describe_exchange(problem: LandmarkProblem) -> str | None:
             others_m[words] = _fit(replace(problem, targets=problem.targets[other]), None, n_restarts=0)[2]
     best = min(others_m, key=others_m.__getitem__, default=None)
     if best is None or others_m[best] >= _EXCHANGED_SHARE * as_named_m:
-        return None
-    return (
+        return None, False
+    note = (
         f"left and right{best} look exchanged: landmarks {as_named_m * 1e3:.0f} mm off as named, "
         f"{others_m[best] * 1e3:.0f} mm the other way; check the points' names, and that no image is mirrored"
     )
+    return note, not best
 
 
 def fit_lengths(model: BodyModel, joints: Array) -> dict[str, float]:

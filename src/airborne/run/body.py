@@ -39,15 +39,15 @@ from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.run.untracked import explain_untracked
 from airborne.run.whole_run import FittedRun, fit_whole_run
-from airborne.tracking import Estimate
-from airborne.tracking.estimate import Status
+from airborne.tracking import Estimate, Status
 from airborne.tracking.evidence import PoseEvidence
+from airborne.tracking.first_pose import FirstPose
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.trial.settings import BodySettings
-from airborne.types import Array, Progress
+from airborne.types import Progress
 from airborne.video import Frames, Recording
 from airborne.video.rereading import Rereading
 
@@ -70,7 +70,7 @@ class BodyRun:
     start: Pose
     found: FoundStart | None = None  # where the start was looked for
     keys: Mapping[int, PoseEvidence] = field(default_factory=dict)  # of later frames, in the order of time
-    points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], as the start marks them
+    first: FirstPose | None = None  # as the trial gives it
     kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
@@ -80,10 +80,10 @@ class BodyRun:
         """Read the body and find its first pose, whose notes become events of the recording."""
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
-        found_notes = () if found is None else (found.note,)
         keys, missed = keys_of_frames(trial, model, opened.recording)
-        opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *first.mistakes, *missed])
-        return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first.points)
+        notes = [*model.notes, *([] if found is None else [found.note])]
+        opened.recording.events.extend([*notes, *first.notes, *first.mistakes, *missed])
+        return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first)
 
     @property
     def n_frames(self) -> int | None:
@@ -149,10 +149,10 @@ class BodyRun:
             return self
         index, pose = found[0][0].index, found[0][1]
         start = pose if index == self.recording.start else self.start
-        if self.points:
+        if self.first is not None and self.first.points:
             tracker = tracker_of(self.trial.settings, fitted, start)
             at_first = tracker.search(tracker.init(), first).pose
-            fitted = fitted if at_first is None else place_landmarks(fitted, at_first, self.points)
+            fitted = fitted if at_first is None else place_landmarks(fitted, at_first, self.first.points)
         keys = keys_of_frames(self.trial, fitted, self.recording)[0] if self.keys else {}
         return replace(self, model=fitted, start=start, keys=keys)
 
@@ -230,7 +230,7 @@ class BodyRun:
         """Check the run, fit it and write the tables; return the motion and the beginning of the summary."""
         sort_rows(folder / self.table)
         motion, model, rig, begun_s = read_motion(folder / self.table), self.model, self.recording.rig, time.monotonic()
-        checked = check_run(motion, model, rig, self.kept, is_preset=self.trial.body.file is None)
+        checked = check_run(motion, model, rig, self.kept, is_preset=self.trial.body.file is None, first=self.first)
         fitted, timings_s = None, {"self_check": time.monotonic() - begun_s}
         if self._fits_whole_run:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))
@@ -245,7 +245,7 @@ class BodyRun:
         of_fall = wrong_flight(motion, measured.flight)
         findings = [*([of_fall.to_dict()] if of_fall else []), *checked.findings]
         self.recording.events.extend([*checked.doubts, *far_keys(self.trial, model, motion, rig)])
-        if not motion.count(Status.TRACKED) and len(motion) > 1:
+        if not motion.count(Status.TRACKED) and len(motion) > 1 and not checked.is_start_wrong:
             args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
             self.recording.events.append((why := explain_untracked(*args)).sentence)
             findings = [] if why.is_mix_up else findings

@@ -30,27 +30,30 @@ class _Shifted:
 
     def __init__(self, first_s: float) -> None:
         self.first_s, self.last_s, self.n_times = first_s, first_s, 0
+        self.suspects: Counter[int] = Counter()
         self.shifts: EvenSample[CameraShift] = EvenSample(_MOST_MOMENTS)
 
     def add(self, time_s: float, shift: CameraShift) -> None:
         """Keep a time, in their order."""
         self.last_s, self.n_times = time_s, self.n_times + 1
+        self.suspects.update(view for view in (shift.view, shift.or_view) if view is not None)
         self.shifts.offer(lambda: shift)
 
     def describe(self, names: Sequence[str], n_times: int) -> str:
         """Say it of a run of so many times."""
         when = f"from {self.first_s:.2f} to {self.last_s:.2f} s, in {self.n_times} of {n_times} frames"
-        if len(names) > 1:
+        who = [names[view] for view, _ in self.suspects.most_common()]
+        if len(who) > 1:
             return (
-                f"self-check: {' or '.join(names)} was moved, or its calibration is wrong: the cameras disagree where "
-                f"the players are {when}, and joints are uncertain there; look which of them shows something else"
+                f"self-check: the cameras disagree where the players are {when}: {', '.join(who[:-1])} or {who[-1]} "
+                "was moved, or calibrated wrongly; joints are uncertain there; leave out each (--cameras) and compare"
             )
         right, down = (float(np.median(each)) for each in zip(*(each[1:3] for each in self.shifts), strict=True))
         ways = (abs(right), "right of" if right > 0 else "left of"), (abs(down), "below" if down > 0 else "above")
         where = " and ".join(f"{px:.0f} px {way}" for px, way in ways if px >= 0.5)
         return (
-            f"self-check: {names[0]} shows the players {where} where the other cameras see them {when}, and is left "
-            "out there: was it moved, or is its calibration another's?"
+            f"self-check: {who[0]} shows the players {where} where the other cameras see them {when}, and is left out "
+            "there: was it moved, or is its calibration another's?"
         )
 
 
@@ -62,15 +65,14 @@ class CameraCheck:
         self._n_times = 0
         self._n_found: Counter[int] = Counter()  # by camera: players found while it had an image
         self._n_shown: Counter[int] = Counter()  # and those of them that it shows
-        self._shifted: dict[tuple[int, ...], _Shifted] = {}  # by camera, or by those of which one was shifted
+        self._shifted: dict[int | None, _Shifted] = {}  # by camera; None: where it is open which one
 
     def add(self, frames: Frames, step: PlayersStep) -> None:
         """Keep a time of the tracker `Blocker`, or not."""
         self._n_times += 1
         registration, time_s = step.state.registration, float(frames.time_s)
         if registration.shift is not None and np.isfinite(registration.shift.right_px):
-            suspects = tuple(sorted(view for view in registration.suspects if view is not None))
-            self._shifted.setdefault(suspects, _Shifted(time_s)).add(time_s, registration.shift)
+            self._shifted.setdefault(registration.left_out, _Shifted(time_s)).add(time_s, registration.shift)
         found = [each for each in step.players if each.status is not Status.LOST]
         for each in found:
             is_shown = shows_player(step.state.players[each.player].colours.occlusion)
@@ -86,14 +88,13 @@ class CameraCheck:
         Of times nothing is said where a camera hardly agrees with the others: it moves what these are compared with.
         One that is late shows the players elsewhere too, where they move.
         """
+        clear = [each.describe(names, self._n_times) for view, each in self._shifted.items() if view is not None]
         if hidden := self._describe_shown(names):
-            return self._describe_shifts(names) or hidden
-        return self._describe_times(names) or self._describe_shifts(names)
-
-    def _describe_shifts(self, names: Sequence[str]) -> list[str]:
-        """Say of each camera, or of those that may be meant, when and how far it is shifted."""
-        most_first = sorted(self._shifted.items(), key=lambda each: -each[1].n_times)
-        return [found.describe([names[view] for view in suspects], self._n_times) for suspects, found in most_first]
+            return clear or hidden
+        times = self._describe_times(names)
+        if times or clear or None not in self._shifted:
+            return times or clear
+        return [self._shifted[None].describe(names, self._n_times)]
 
     def _describe_shown(self, names: Sequence[str]) -> list[str]:
         shares = {names[i]: self._n_shown[i] / n for i, n in sorted(self._n_found.items())}

@@ -13,6 +13,8 @@ from airborne.cameras import Rig
 from airborne.errors import count_of
 from airborne.motion import Motion
 from airborne.tracking import Doubt, Status
+from airborne.tracking.first_pose import FirstPose
+from airborne.tracking.first_pose.body_size import WrongSize
 from airborne.tracking.model_based.status import UNCERTAIN_SD_M
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
 from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong_flight
@@ -40,13 +42,16 @@ class CheckedRun:
     motion: Motion  # with lasting errors and those of a rough path, doubtful frames uncertain
     found: SelfCheck | None  # None: too little to say anything
     doubts: tuple[str, ...]  # sentences
-    wrong: Sequence[WrongFall | PathFinding] = ()  # of a thing, what no size, camera or clock explains
+    wrong: Sequence[WrongFall | PathFinding | WrongSize] = ()  # what no camera or clock explains
+    is_start_wrong: bool = False  # by its own landmarks
 
     @property
     def findings(self) -> list[dict[str, Any]]:
         """What summary.json holds."""
         causes = () if self.found is None else self.found.diagnosis.findings
-        return [finding.to_dict() for finding in (*self.wrong, *causes)]
+        wrong = [finding.to_dict() for finding in self.wrong]
+        said = {(each["subject"], each["kind"]) for each in wrong}
+        return [*wrong, *(each.to_dict() for each in causes if (each.subject, each.kind) not in said)]
 
 
 def check_run(
@@ -56,10 +61,11 @@ def check_run(
     kept: KeptFrames,
     *,
     is_preset: bool,
+    first: FirstPose | None = None,
 ) -> CheckedRun:
-    """Check a finished run by some of its frames, in the order in which they were tracked."""
-    rows, first = np.flatnonzero(motion.has_pose), next(iter(kept), None)
-    if not len(rows) or first is None:
+    """Check a finished run by some of its frames, in the order in which they were tracked, and by its first pose."""
+    rows, begun = np.flatnonzero(motion.has_pose), next(iter(kept), None)
+    if not len(rows) or begun is None:
         return CheckedRun(motion, None, ())
     frames = sorted(kept, key=lambda each: each.index)
     poses = [motion.pose(row) for row in rows]
@@ -73,12 +79,18 @@ def check_run(
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
     status, doubted, sentences = motion.status.astype(object), motion.doubts.astype(object), []
-    wrong: list[WrongFall | PathFinding] = []
-    reasons = doubts(model, path, frames, first.index, found)
+    wrong: list[WrongFall | PathFinding | WrongSize] = []
+    reasons = doubts(model, path, frames, begun.index, found)
+    is_start_wrong = first is not None and bool(first.wrong_size or first.exchange)
+    if first is not None and is_start_wrong:
+        wrong += [first.wrong_size] if first.wrong_size else []
+        reasons[first.exchange or "the body is not as large as the landmarks of its start say"] = np.ones(
+            len(rows), bool
+        )
     if not model.has_joints:
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
         of_flight = find_wrong_flight(*flight)
-        wrong = [each for each in (of_path, of_flight) if each is not None]
+        wrong += [each for each in (of_path, of_flight) if each is not None]
         if of_flight is None and len(rig) == 1 and found is not None and fall(*flight) is None:
             sentences.append(_UNKNOWN_SIZE)
         if of_path is not None and of_path.kind == "repeated":
@@ -103,7 +115,7 @@ def check_run(
     if rough.max() > 1:  # beside what the frames say themselves, which a run that is resumed keeps
         lasting = excess if lasting is None else lasting + excess
     checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)
-    return CheckedRun(checked, found, tuple(sentences), wrong)
+    return CheckedRun(checked, found, tuple(sentences), wrong, is_start_wrong)
 
 
 def _excess(covariance: Array, rough: Array) -> Array:

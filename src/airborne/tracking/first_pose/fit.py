@@ -17,6 +17,7 @@ from airborne.cameras.detections import Detections, landmarks_from_points
 from airborne.cameras.skeletons import LANDMARK_RECIPES, SKELETONS
 from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
+from airborne.tracking.first_pose.body_size import WrongSize, find_wrong_size
 from airborne.types import Array
 
 _ROUNDING_RAD = 1e-9  # an angle beyond its limit by less is at it
@@ -40,6 +41,8 @@ class FirstPose:
     notes: tuple[str, ...] = ()  # what the user should know, one line each
     mistakes: tuple[str, ...] = ()  # points that cannot be right
     points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], those that were given
+    wrong_size: WrongSize | None = None  # of the body, by the points
+    exchange: str = ""  # what says that left and right of the whole body are exchanged
 
 
 def pose_by_hand(
@@ -103,6 +106,8 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     off_m = {name: distance for name, distance in fit.residual_m.items() if np.isfinite(distance)}
     worst = max(off_m, key=off_m.__getitem__)
     missing = ", ".join(name for name, point in targets.items() if np.isnan(point).any())
+    given = {name: point for name, point in targets.items() if np.isfinite(point).all()}
+    wrong_size = None if fit.is_exchanged else find_wrong_size(model, given, LANDMARK_WEIGHTS, fit.rms_m)
     doubt = "; check the points and the body's size" if fit.rms_m > _DOUBTFUL_RMS_M else ""
     mistakes = [
         f"{where}: {name} lies {distance:.1f} m from where the body can have it; correct it, or the body's size"
@@ -114,9 +119,11 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
         f"the largest is {worst} with {off_m[worst] * 1e3:.0f} mm{doubt}",
         f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
         f"{where}: {fit.note}" if fit.note else "",
+        f"{where}: {wrong_size.sentence}" if wrong_size else "",
     ]
-    given = {name: point for name, point in targets.items() if np.isfinite(point).all()}
-    return FirstPose(fit.pose, tuple(note for note in notes if note), tuple(mistakes), given)
+    exchange = f"{where}: {fit.note}" if fit.note and fit.is_exchanged else ""
+    said = tuple(note for note in notes if note)
+    return FirstPose(fit.pose, said, tuple(mistakes), given, wrong_size, exchange)
 
 
 def check_landmark_names(model: BodyModel, where: str, names: Sequence[str]) -> None:
