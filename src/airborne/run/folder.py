@@ -22,6 +22,8 @@ from airborne.motion import drop_rows
 from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.files import copy_motion, remove_motion
 from airborne.motion.run_folder import (
+    AGREEMENT,
+    AGREEMENT_METHODS,
     BODY,
     CALIBRATION,
     CANDIDATES,
@@ -30,6 +32,7 @@ from airborne.motion.run_folder import (
     JOINTS,
     JUMPS,
     MOTION,
+    REPEATABILITY,
     REPORT,
     RUN_RECORD,
     SMOOTH_RECORD,
@@ -62,8 +65,9 @@ def prepare_folder(
 
     Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not.
     A run of one body that differs in keys and masks alone loses the rows that these touch, which are then tracked
-    again. What was made of another motion than the last goes: report, pictures, smoothed tables. Raises ResultError for
-    a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
+    again. What was made of another motion than the last goes: report, pictures, smoothed tables, comparisons. Raises
+    ResultError for a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other
+    inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
     foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
@@ -172,8 +176,9 @@ def stretches_of(
 
 
 def _remove_made(folder: Path) -> None:
-    """Remove what is made of a motion: report, pictures and smoothed tables."""
-    for path in (folder / REPORT, folder / SMOOTH_RECORD, *(folder / TABLES).glob("smooth_*")):
+    """Remove what is made of a motion: report, pictures, smoothed tables and comparisons."""
+    made = (REPORT, SMOOTH_RECORD, AGREEMENT, REPEATABILITY, AGREEMENT_METHODS)
+    for path in (*(folder / name for name in made), *(folder / TABLES).glob("smooth_*")):
         path.unlink(missing_ok=True)
     for name in (FIGURES, VIDEOS):
         shutil.rmtree(folder / name, ignore_errors=True)
