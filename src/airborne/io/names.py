@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from os import PathLike, fspath
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator
+
+from airborne.errors import AirborneError
 
 _LONGEST_NAME = 80  # characters
 _LONGEST_PART, _LONGEST_PATH = 255, 1000  # bytes of a file name, and of a path below a folder: of file systems
@@ -43,6 +46,13 @@ def check_path(path: str) -> str:
             f"a file's name has at most {_LONGEST_PART} bytes and a path {_LONGEST_PATH}; shorten {_quote(path)}"
         )
     return path
+
+
+def to_path(value: Any) -> Path:
+    """Return text or a path object as a Path; raises AirborneError for anything else."""
+    if not isinstance(value, str | PathLike):
+        raise AirborneError(f"expected a path, as text or a Path (found {type(value).__name__} {str(value)[:60]})")
+    return Path(value)
 
 
 def _path_text(path: Any) -> Any:

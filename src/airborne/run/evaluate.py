@@ -49,7 +49,8 @@ from airborne.run.folder import open_results
 from airborne.run.provenance import versions
 from airborne.run.reference_series import body_series, players_series
 
-Comparisons = Mapping[str, MotionComparison | DigitisedComparison | JointComparison | PlayersComparison]
+Comparison = MotionComparison | DigitisedComparison | JointComparison | PlayersComparison
+Comparisons = Mapping[str, Comparison]
 
 _LARGEST_METHODS_BYTES = 1_000_000  # a hundred comparisons; anything larger was not written here
 

@@ -37,6 +37,7 @@ _NOT_REPEATED = (
     "has two"
 )
 
+
 def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[str], *, real_time: bool) -> str:
     """Return a methods paragraph, one of results, what was left out, and the references."""
     curves = [each for each in comparisons if each.axis is not None]
@@ -56,7 +57,9 @@ def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[s
             "and conditions, which holds the error of the measurement."
         )
     if not all(are_repeated):
-        text.append("Where no athlete has two trials in a condition, each mean has the variance of the measurement alone.")
+        text.append(
+            "Where no athlete has two trials in a condition, each mean has the variance of the measurement alone."
+        )
     text.append(
         "Differences of conditions were pooled over athletes with random effects: the variance between athletes by "
         "Paule and Mandel (1982), 95 % intervals by Hartung and Knapp (2001) with Student's t."

@@ -37,13 +37,13 @@ class StudyTrial:
         return value if abs(value) < LARGEST else None
 
     def measured(self, name: str) -> float | None:
-        """Return a number of the row; None where the cell is empty. Raises ResultError where it holds something else."""
+        """Return a number of the row; None where the cell is empty; raises ResultError for anything else."""
         value = self.number(name)
         cell = self.row.get(name, "")
         if value is None and cell.lower() not in _EMPTY:
             raise ResultError(
-                f"{TABLE}, row of trial {self.name}, column {name}: expected a number or nothing (found '{cell[:60]}'); "
-                "correct it, or give the batch again"
+                f"{TABLE}, row of trial {self.name}, column {name}: expected a number or nothing "
+                f"(found '{cell[:60]}'); correct it, or give the batch again"
             )
         return value
 
