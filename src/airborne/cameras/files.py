@@ -151,9 +151,7 @@ def write_rig(
     """
     path = to_path(path)
     if not isinstance(rig, Rig):
-        raise CalibrationError(
-            f"write_rig writes a Rig (found {rig!r}); give Rig((camera, ...)) for single cameras"[:300]
-        )
+        raise CalibrationError(f"write_rig writes a Rig (found {str(rig)[:100]}); give Rig((camera, ...)) for cameras")
     kind = format or format_of_name(path)
     file_unit = _unit(kind, unit)
     texts, notes = _texts(kind, rig, file_unit, pixels=pixels or PixelConvention(), errors_px=errors_px)
