@@ -21,9 +21,7 @@ _OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
 _MEANT_AS_TRIAL = re.compile(r"^[ \t]*(\[\[camera|session[ \t]*=)", re.MULTILINE)
 _OF_A_SESSION = {"calibration", "body", "athletes"}  # a file with labels and one of these may be what trials share
-_ALIKE = (
-    0.8  # of words; chosen between slips, as difflib measures them (cameras 0.92, camara 0.83), and cam1 (0.6)
-)
+_ALIKE = 0.8  # of words; chosen between slips, as difflib measures them (cameras 0.92, camara 0.83), and cam1 (0.6)
 _HEAD_BYTES = 100_000  # of a file that is no TOML, in which words of a trial are looked for
 _TABLE_FORM = "a table of trials has a line of names, one of them trial, then a line for each trial"
 

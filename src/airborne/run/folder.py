@@ -256,10 +256,26 @@ def _key_digests(trial: Trial) -> dict[str, str]:
 def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
     """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
     names = [*(camera.video for camera in trial.camera if not live), *trial.input_files, *_further_files(trial)]
-    rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
-    start = json.dumps([table and table.model_dump() for table in rest])
-    hashes = {name: file_digest(trial.path(name)) for name in names}
-    return {**hashes, _START_AND_LIGHTS: hashlib.sha256(start.encode()).hexdigest()}
+    return {name: file_digest(trial.path(name)) for name in names} | {_START_AND_LIGHTS: _tables_digest(trial)}
+
+
+def has_other_tables(trial: Trial, folder: Path) -> bool:
+    """Say whether a trial's start, lights, calibration, body or cameras have changed since its run in a folder.
+
+    Not of what lies in files; nor where the start is found, as the run holds it as it was found.
+    """
+    record = folder / RUN_RECORD
+    if trial.start.find or not record.is_file():
+        return False
+    inputs = read_record(record).get("inputs")
+    recorded = inputs.get(_START_AND_LIGHTS) if isinstance(inputs, dict) else None
+    return recorded is not None and recorded != _tables_digest(trial)
+
+
+def _tables_digest(trial: Trial) -> str:
+    tables = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
+    text = json.dumps([table and table.model_dump() for table in tables])
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _further_files(trial: Trial) -> list[str]:
