@@ -58,7 +58,7 @@ def _draw_difference(axes: Axes, axis: Array, contrast: Contrast, title: str) ->
     axes.axhline(0, color=_GREY, linewidth=0.6)
     axes.fill_between(axis, difference.low, difference.high, color=_GREY, alpha=0.15, linewidth=0)
     axes.plot(axis, difference.value, color=_GREY)
-    panels.label_panel(axes, f"{title}: {contrast.b} minus {contrast.a}, 95 %")
+    panels.label_panel(axes, f"{contrast.b} minus {contrast.a}\n{title}, 95 %")
 
 
 def _draw_test(axes: Axes, axis: Array, contrast: Contrast) -> None:
