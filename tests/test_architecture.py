@@ -194,7 +194,7 @@ def test_imports_only_go_down_the_page():
 def test_no_room_imports_the_public_interface():
     public = {*airborne.__all__, "interface"}
     found = offenders(lambda path, text: {imported[0] for imported in imports_of(text) if imported} & public)
-    assert set(found) <= {"__init__.py"}
+    assert set(found) <= {"__init__.py", "interface/__init__.py"}  # which has modules of its own
 
 
 def test_only_its_command_imports_the_studio():

@@ -102,6 +102,15 @@ def test_what_a_run_holds_is_shown_in_a_line(done):
     assert re.fullmatch(r"<Camera 'cam1': 768×576 px, focal length 10\d\d.\d px, at .* m>", repr(run.rig.cameras[0]))
 
 
+def test_repeated_runs_agree_in_python_as_by_the_command(done, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("results", "in-code"):
+        shutil.copytree(done[0] / name, name)
+    found = ab.evaluate("results", repeats="in-code")
+    assert list(found) == ["agreement"] and "between runs" in found["agreement"].describe()
+    assert (tmp_path / "results" / "tables" / "repeatability.csv").is_file()
+
+
 def test_examples_of_docstrings_run(done, tmp_path, monkeypatch):
     folder, _ = done
     shutil.copytree(THROWN_CROSS, tmp_path, dirs_exist_ok=True)
@@ -146,7 +155,16 @@ def test_the_study_holds_no_outputs():
         (lambda: ab.read_rig("calib.toml")["cam1"].px_from_world([0, 1]), "expected (..., 3)"),
         (lambda: ab.read_rig("calib.toml").points_from_px([0, 1]), "expected (..., 3, 2), a row a camera"),
         (lambda: ab.read_trial("trial.toml", stopp=3), "stopp = 3: track.stopp: unknown key; did you mean stop?"),
-        (lambda: ab.evaluate("results"), "give truth, digitised or joints"),
+        (lambda: ab.evaluate("results"), "give truth, digitised, joints"),
+        (lambda: ab.synthesise("cross", "p", seed=-1), "seed is -1; expected a whole number, 0 or more"),
+        (lambda: ab.synthesise("cross", "p", seed="a"), "seed is 'a'; expected a whole number"),
+        (lambda: ab.smooth("results", events_s="none"), "events_s is 'none'; expected times in seconds"),
+        (lambda: ab.read_run(5), "expected a path, as text or a Path (found int 5)"),
+        (lambda: ab.read_trial(3), "expected a path"),
+        (lambda: ab.track(None, "p"), "expected a path"),
+        (lambda: ab.evaluate("results", np.zeros(3)), "expected a path, as text or a Path (found ndarray"),
+        (lambda: ab.write_rig("c.toml", ab.read_rig("calib.toml")["cam1"]), "write_rig writes a Rig (found <Camera"),
+        (lambda: ab.read_rig("calib.toml").select("cam1"), "select takes a list of names; give ['cam1']"),
     ],
 )
 def test_what_a_user_can_correct_is_said_in_one_line_of_python(mistake, said, done, tmp_path, monkeypatch):

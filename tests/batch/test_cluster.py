@@ -14,7 +14,7 @@ import pytest
 
 from airborne.batch import cluster
 from airborne.batch.cluster import do_tasks, open_client
-from airborne.batch.run import run_batch
+from airborne.batch.run import Machines, run_batch
 from airborne.batch.table import write_outputs
 from airborne.batch.task import TaskOutcome
 from airborne.batch.trials import BatchTrial, list_trials
@@ -192,6 +192,17 @@ def test_a_stopped_batch_says_what_was_not_tracked(tmp_path):
     assert "2 trials, 1 not run" in page
     assert "<b>anna" not in page and "&lt;b&gt;anna" in page
     assert "http" not in page, "it needs no network"
+
+
+def test_a_batch_that_is_stopped_before_any_trial_is_done_leaves_its_table(season, tmp_path, monkeypatch):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("airborne.batch.run.do_tasks", stop)
+    with pytest.raises(KeyboardInterrupt):
+        run_batch(list_trials(str(season)), tmp_path, machines=Machines(workers=1))
+    with (tmp_path / "trials.csv").open() as file:
+        assert {row["status"] for row in csv.DictReader(file)} == {"not run"}
 
 
 def test_two_batches_do_not_write_into_one_folder(season, tmp_path):

@@ -33,7 +33,10 @@ def test_a_folders_trials_are_its_trial_files_at_any_depth(tmp_path):
     write(tmp_path / "broken.toml", "name =\n[[camera]]")
     write(tmp_path / "body.toml", "name =")
     write(tmp_path / "misspelt.toml", "name = 'x'\n[[cameras]]\nname = 'y'")
-    found = ["a", "b", "broken", "c", "misspelt"]
+    write(tmp_path / "slip.toml", 'sesion = "session.toml"\nlabels = {athlete = "anna"}')
+    write(tmp_path / "unnamed.toml", 'labels = {athlete = "anna"}\n[start]\nframe = 0')
+    write(tmp_path / "shared.toml", 'labels = {day = "1"}\n[body]\npreset = "legs"')
+    found = ["a", "b", "broken", "c", "misspelt", "slip", "unnamed"]
     assert names(tmp_path) == found, "a file that cannot be read or has a mistake is not passed over"
     assert set(names(tmp_path / "?.toml")) == {"b", "c"}
 

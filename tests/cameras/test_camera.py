@@ -59,3 +59,22 @@ def test_a_field_keeps_its_rows_where_they_were():
 def test_an_unknown_camera_is_named_with_those_that_exist():
     with pytest.raises(CalibrationError, match=r"'front' not in rig; it has: left, right, side"):
         three_cameras()["front"]
+
+
+@pytest.mark.parametrize("distortion", [None, LENS])
+@pytest.mark.parametrize("px", [[1, 2, 3], 5.0, "a", [[1, 2], [3]]])
+def test_what_are_no_pixels_is_refused_by_its_shape(distortion, px):
+    camera = camera_at((-4, -5, 1.5), distortion=distortion)
+    for change in (camera.distort_px, camera.undistort_px):
+        with pytest.raises(CalibrationError, match=r"expected \(\.\.\., 2\), u, v"):
+            change(px)
+
+
+@pytest.mark.parametrize(
+    ("weights", "said"), [([1, 1], r"expected \(\.\.\., 3\), one a camera"), ([1, -1, 1], "is -1;")]
+)
+def test_weights_are_one_a_camera_and_none_below_zero(weights, said):
+    rig = three_cameras(None)
+    px = np.stack([camera.px_from_world([0.0, 0.0, 1.0]) for camera in rig])
+    with pytest.raises(CalibrationError, match=said):
+        rig.points_from_px(px, weights=weights)

@@ -169,3 +169,25 @@ def test_a_reference_in_millimetres_is_asked_about_in_columns_that_stay_apart():
     row = next(line for line in text.splitlines() if line.startswith("  in space"))
     assert len(row.split()) == 4
     assert "millimetres" not in compare_motion(motion_of(true), true, IDENTITY).describe()
+
+
+def test_a_truth_whose_clock_is_off_by_a_frame_is_reported():
+    true = flight()
+    period_s = float(np.diff(true.time_s)[0])
+    result = compare_motion(motion_of(true), replace(true, time_s=true.time_s + 2 * period_s), IDENTITY)
+    assert result.better_shift_s == pytest.approx(-2 * period_s, abs=ROUNDTRIP)
+    assert result.better_rms_3d_mm == pytest.approx(0, abs=1e3 * ROUNDTRIP)
+    assert f"{-2e3 * period_s:.1f} ms added" in result.describe()
+
+
+def test_a_constant_error_is_no_shift_of_the_clock():
+    result = compare_motion(shifted(motion_of(flight()), [0.003, 0, -0.004]), flight(), IDENTITY)
+    assert result.better_shift_s == 0 and result.better_rms_3d_mm == pytest.approx(5)
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.1])
+def test_times_in_milliseconds_are_asked_about(later_s):
+    true = flight()
+    motion = replace(motion_of(true), time_s=true.time_s + later_s)
+    with pytest.raises(ResultError, match=r"are they in milliseconds\? .* divide it by 1000"):
+        compare_motion(motion, replace(true, time_s=1e3 * motion.time_s), IDENTITY)

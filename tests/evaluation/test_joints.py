@@ -126,6 +126,11 @@ def test_a_reference_whose_clock_is_off_by_a_frame_is_reported():
     assert "-16.7 ms" in result.describe()
 
 
+def test_a_reference_with_times_in_milliseconds_is_asked_about():
+    with pytest.raises(ResultError, match="are they in milliseconds"):
+        compare_joints(run(), MODEL, replace(paths(), time_s=1e3 * paths().time_s))
+
+
 def test_correct_deviations_contain_two_thirds_of_the_errors():
     covariance, rng = small_covariance(MODEL, sd=5e-3), np.random.default_rng(0)
     motion = run(covariance=covariance)

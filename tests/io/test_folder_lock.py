@@ -116,3 +116,9 @@ def test_a_link_that_leads_out_of_the_folder_is_refused(tmp_path):
     (tmp_path / "run" / "tables" / "angles.csv").symlink_to(tmp_path / "mine")
     with pytest.raises(ResultError, match=r"angles.csv is a link that leads out of"):
         refuse_links(tmp_path / "run")
+
+
+def test_whatever_finds_no_room_in_the_folder_is_told_as_a_full_disk(tmp_path):
+    expected = rf"{tmp_path}/run cannot be written \(No space left on device\): \d+ MB are free"
+    with pytest.raises(ResultError, match=expected), sole_writer(tmp_path / "run"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -61,3 +61,9 @@ def test_a_file_is_replaced_through_no_link_and_over_a_killed_writers_rest(tmp_p
     replace_text(tmp_path / "a.txt", "again", is_durable=False)
     assert other.read_text() == "theirs"
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.txt": "again", "other.txt": "theirs"}
+
+
+def test_a_file_that_could_not_be_written_leaves_no_rest(tmp_path):
+    with pytest.raises(UnicodeEncodeError):
+        replace_text(tmp_path / "a.txt", "\ud800")
+    assert contents_of(tmp_path) == {}

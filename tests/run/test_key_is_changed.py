@@ -79,9 +79,10 @@ def test_frames_between_the_neighbours_of_a_changed_key_are_tracked_again(
 ):
     before, found = poses(run), searched(monkeypatch)
     assert list(before) == list(range(LAST))
-    made = [*smooth_run(run, Smoothing(method="spline")).files, "report.html", "videos/overlay_cam1.mp4"]
+    made = [*smooth_run(run, Smoothing(method="spline")).files, "tables/agreement.csv", "agreement_methods.txt"]
+    made += ["report.html", "videos/overlay_cam1.mp4"]
     videos_of(run)
-    for name in made[-2:]:
+    for name in made[-4:]:
         (run / name).write_text("of before")
     changed = cross(key(thrown_cross, 4, sd_m=0.002), key(thrown_cross, 8))
     summary = track_trial(changed, run, resume=True, pictures=False).summary

@@ -162,7 +162,7 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         page.get_by_text(f"body turned, frame {TURNED}").first.wait_for()
         page.get_by_role("button", name="Leave it out").click()  # the first camera, of the frame in view
         page.get_by_text(f"{rig.names[0]} left out of frame {TURNED}").first.wait_for()
-        assert page.get_by_role("button", name="Next lost: 1").is_enabled()
+        assert page.get_by_role("button", name="Next lost or unseen: 1").is_enabled()
         page.keyboard.press("r")
         wait_for_frame(page, LOST)
         page.get_by_text(f"Frame {LOST} is lost. The white outline is a guess").wait_for()
@@ -170,7 +170,7 @@ def test_a_dragged_joint_and_a_turned_body_are_keys_and_their_frames_are_tracked
         page.get_by_text(re.compile(f"corrected in {rig.names[CAMERA]}, frame {LOST}")).first.wait_for()
         again.click()
         page.get_by_text(f"frames {FRAME - 2} to {LAST - 1} tracked again; at frame ").wait_for(timeout=5 * MINUTE)
-        page.get_by_role("button", name="Next lost: none").wait_for()
+        page.get_by_role("button", name="Next lost or unseen: none").wait_for()
         label = "document.querySelector('canvas.view').view.shown.overlay.label"
         page.wait_for_function(f"{label}.endsWith('tracked')")
     key, turned, found = read_toml(folder / "trial.toml")["key"]

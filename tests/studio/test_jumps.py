@@ -113,7 +113,7 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back_of_the_run_that_is_chosen(f
                 page.locator(f'canvas.curves[aria-description="{says}"]').wait_for()
         page.wait_for_function(f"({STICKS})() === {2 * 5}")  # of two players, down both legs and across the hips
         assert page.get_by_role("button", name="next uncertain").is_enabled()
-        assert not page.get_by_role("button", name="next lost").is_enabled()
+        assert not page.get_by_role("button", name="next lost or unseen").is_enabled()
         page.get_by_role("switch", name="Leave cameras out").click()
         page.get_by_role("button", name="Leave it out").click()
         page.get_by_text("left out of frame 11; players are tracked again from the start").wait_for()
@@ -136,9 +136,9 @@ def test_keys_go_to_the_next_frame_in_doubt_and_back_of_the_run_that_is_chosen(f
         page.get_by_label("run", exact=True).focus()  # who comes by keys is in the list
         page.keyboard.press("Home")
         assert page.evaluate("document.querySelector('canvas.view').view.wanted") == N - 1
-        page.get_by_role("button", name="next lost").press("Home")
+        page.get_by_role("button", name="next lost or unseen").press("Home")
         wait_for_frame(page, 0)
-        page.get_by_role("button", name="next lost").press("ArrowRight")
+        page.get_by_role("button", name="next lost or unseen").press("ArrowRight")
         wait_for_frame(page, 1)
-        page.get_by_role("button", name="next lost").press(" ")  # which has pressed it
+        page.get_by_role("button", name="next lost or unseen").press(" ")  # which has pressed it
         wait_for_frame(page, LOST)

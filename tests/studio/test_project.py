@@ -1,5 +1,6 @@
 """The steps' states are computed from the trial's files."""
 
+import json
 import shutil
 
 import pytest
@@ -8,10 +9,12 @@ from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
 from airborne.io.folder_lock import sole_writer
+from airborne.run.folder import run_identity
 from airborne.studio.pages.body import describe_body
 from airborne.studio.project import find_trial, list_measurements, list_runs, read_project, steps
 from airborne.studio.run_names import check_run_name, next_run_name
 from airborne.studio.session import Session
+from airborne.trial.file import read_trial
 from tests.support.places import THROWN_CROSS
 
 
@@ -64,6 +67,16 @@ def test_a_run_is_ready_once_it_is_finished(tmp_path):
         assert track_step() == ("empty", "results, going on")
     (run / "summary.json").write_text("{}")
     assert track_step() == ("ready", "results")
+    (run / "run.json").write_text(json.dumps(run_identity(read_trial(folder / "trial.toml"))))
+    assert track_step() == ("ready", "results")
+    text = (folder / "trial.toml").read_text()
+    (folder / "trial.toml").write_text(
+        text.replace('file = "cross.toml"', 'preset = "human18"\nstature_m = 1.7\nmass_kg = 60')
+    )
+    assert track_step() == (
+        "needs you",
+        "results is of another start, calibration, body or camera than now; track again",
+    )
 
 
 def test_what_the_steps_say_is_looked_at_again_after_every_change(tmp_path):

@@ -59,7 +59,7 @@ def test_a_run_is_searched_for_doubt_and_compared_with_another(folder):
         page.get_by_label("run").click()
         page.get_by_role("option", name="results").click()
         go_home(page)
-        assert page.get_by_role("button", name="Next lost").is_disabled()
+        assert page.get_by_role("button", name="Next lost or unseen").is_disabled()
         page.get_by_role("button", name="Next uncertain").click()
         wait_for_frame(page, UNCERTAIN)
         page.get_by_role("button", name="Which camera disagrees?").click()
@@ -78,7 +78,7 @@ def test_a_run_is_searched_for_doubt_and_compared_with_another(folder):
         page.keyboard.press("Escape")
         doubt = {str(UNCERTAIN - 1): "lost", str(UNCERTAIN): "uncertain"}
         edit_rows(folder / "results" / "motion.csv", lambda row: row.update(status=doubt.get(row["frame"], "tracked")))
-        page.get_by_role("button", name="Next lost: 1").wait_for()  # the file was tracked anew
-        page.get_by_role("button", name="Next lost: 1").click()
+        page.get_by_role("button", name="Next lost or unseen: 1").wait_for()  # the file was tracked anew
+        page.get_by_role("button", name="Next lost or unseen: 1").click()
         wait_for_frame(page, UNCERTAIN - 1)
         page.wait_for_function("document.querySelector('canvas.view').view.shown.overlay.label.endsWith('lost')")

@@ -61,6 +61,28 @@ def test_of_a_number_that_is_the_same_in_all_trials_no_interval_is_stated(tmp_pa
     assert "wet minus dry is 0 and could not be tested: too few, or all the same; within 5 athletes" in text
 
 
+def test_without_repeated_trials_no_spread_of_trials_is_stated(tmp_path):
+    assert in_process("compare", season(tmp_path / "in", n=1), "-o", tmp_path, "--variable", "turned_deg") == 0
+    (row,) = csv.DictReader((tmp_path / "differences.csv").read_text().splitlines())
+    assert (row["sd_trials"], float(row["sd_measurement"]), row["mdc"]) == ("", 2, "")
+    text = (tmp_path / "comparison.txt").read_text()
+    assert "need two trials of an athlete in a condition, and none has two" in text and "pooled within" not in text
+
+
+def test_a_cell_that_is_no_number_is_refused_by_its_row_and_column(tmp_path):
+    text = (season(tmp_path) / "trials.csv").read_text()
+    (tmp_path / "trials.csv").write_text(text.replace(",2.0,", ",abc,", 1))
+    expected = r"row of trial anna_dry_0, column turned_deg_sd: .* \(found 'abc'\)"
+    with pytest.raises(AirborneError, match=expected):
+        compare_trials(read_study(tmp_path), "turned_deg", ())
+
+
+def test_a_folder_of_a_run_gets_no_comparison(results, tmp_path):
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(AirborneError, match=r"holds a run; give another folder"):
+        write_comparison(results, tmp_path, ["turned_deg"])
+
+
 def test_a_curve_differs_where_it_does(results):
     compared = compare_trials(read_study(results), "somersault_deg", ("start", "end"))
     (contrast,) = compared.contrasts
@@ -103,7 +125,8 @@ def test_a_trial_that_lacks_an_event_is_left_out_and_named(results):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--variable", "height_m"], "height_m: .* numbers and curves here: turned_deg"),
+        (["--variable", "height_m"], "height_m is no number .* numbers: turned_deg, .*; curves: somersault_deg$"),
+        (["--variable", "turned_rev"], "did you mean turned_deg"),
         (["--variable", "turned_deg", "--events", "take-off"], "give two or more"),
         (["--variable", "turned_deg", "--events", "start,finish"], "event 'finish' is not known"),
         (["--variable", "turned_deg", "--conditions", "dry"], "give two or more to compare"),
@@ -146,8 +169,10 @@ def test_failed_trials_are_named_in_the_text(tmp_path):
 
 
 def test_a_folder_without_a_batch_is_one_line(tmp_path):
-    with pytest.raises(AirborneError, match="cannot be read"):
+    with pytest.raises(AirborneError, match=r"has no trials\.csv; .* a batch that was stopped again"):
         read_study(tmp_path)
+    with pytest.raises(AirborneError, match="cannot be read"):
+        read_study(tmp_path / "nowhere")
     (tmp_path / "trials.csv").write_text("trial\nx\n")
     with pytest.raises(AirborneError, match="lacks condition, error, folder, status"):
         read_study(tmp_path)

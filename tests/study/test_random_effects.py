@@ -89,7 +89,8 @@ def test_spreads_split_what_the_measurement_explains():
 
 def test_without_repeated_trials_the_measurement_alone_is_known():
     spread = within_spread(draw(np.random.default_rng(7), trials=1))
-    np.testing.assert_allclose([spread.sd_within[0], spread.sd_trials[0]], [0.5, 0.0], atol=EXACT)
+    np.testing.assert_allclose(spread.sd_measurement, 0.5, atol=EXACT)
+    assert np.isnan([spread.sd_within, spread.sd_trials, spread.mdc]).all()
 
 
 @pytest.mark.parametrize("options", [{}, {"trials": (2, 7)}, {"athletes": 16, "paired": False}])

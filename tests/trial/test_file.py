@@ -178,6 +178,11 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         ('file = "body.toml"', 'preset = "human18"\nstature_m = 1.8', "stature_m and mass_kg go with a preset, both"),
         ('file = "body.toml"', 'file = "body.toml"\nmass_kg = 70', "stature_m and mass_kg go with a preset"),
         ('file = "body.toml"', 'preset = "human18"\nstature_m = -1\nmass_kg = 70', "body.stature_m"),
+        (
+            'file = "body.toml"',
+            'preset = "human18"\nstature_m = 172\nmass_kg = 70',
+            "stature_m is 172; expected 0.8 to 2.5 metres: is it in centimetres",
+        ),
         ('file = "body.toml"', 'measurements = "none.txt"', "none.txt not found in "),
         (
             'file = "calib.toml"',

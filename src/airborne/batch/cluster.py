@@ -198,4 +198,6 @@ def _describe_end(error: BaseException | None) -> str:
             "worker after worker died with it, of too little memory or killed; give each more with --memory, "
             "or start fewer"
         )
+    if isinstance(error, AirborneError):
+        return str(error)
     return " ".join(f"unexpected {type(error).__name__}: {error}".split())[:400]

@@ -10,7 +10,7 @@ from airborne.batch.cluster import count_workers, do_tasks, import_for_workers, 
 from airborne.batch.progress import show_progress
 from airborne.batch.table import not_reached, write_outputs
 from airborne.batch.task import LOGS, THUMBNAILS, Task, TaskOutcome, inspect_folder
-from airborne.batch.trials import BatchTrial
+from airborne.batch.trials import TABLE, BatchTrial
 from airborne.errors import AirborneError, ResultError
 from airborne.io.folder_lock import sole_writer
 from airborne.trial.file import read_trial
@@ -53,20 +53,20 @@ def run_batch(
     tasks = plan_tasks(trials, folder, pictures=pictures)
     n_workers = min(machines.workers or count_workers(machines.memory), len(tasks))
     outcomes: dict[str, TaskOutcome] = {}
-    with sole_writer(folder):
+    with sole_writer(folder), open_client(machines.scheduler, n_workers, machines.memory) as client:
+        say(f"dashboard: {client.dashboard_link}")
+        info = client.scheduler_info()
+        if not info["workers"]:
+            address = info["address"]
+            say(f"waiting for workers; start them with: dask worker {address} --nthreads 1")
         try:
-            with open_client(machines.scheduler, n_workers, machines.memory) as client:
-                say(f"dashboard: {client.dashboard_link}")
-                info = client.scheduler_info()
-                if not info["workers"]:
-                    address = info["address"]
-                    say(f"waiting for workers; start them with: dask worker {address} --nthreads 1")
-                with show_progress(len(tasks)) as progress:
-                    for outcome in do_tasks(client, tasks, report=progress.tell):
-                        outcomes[outcome.name] = outcome
-                        progress.end(outcome)
+            with show_progress(len(tasks)) as progress:
+                for outcome in do_tasks(client, tasks, report=progress.tell):
+                    outcomes[outcome.name] = outcome
+                    progress.end(outcome)
         finally:
-            files = write_outputs(folder, trials, outcomes) if outcomes else []
+            is_new = not (folder / TABLE).exists()
+            files = write_outputs(folder, trials, outcomes) if outcomes or is_new else []
     return BatchResult(tuple(outcomes.get(trial.name, not_reached(trial)) for trial in trials), tuple(files))
 
 

@@ -22,6 +22,7 @@ from airborne.errors import AirborneError
 from airborne.export import write_json
 from airborne.export.pictures import thumbnail
 from airborne.io.text import read_json
+from airborne.io.writing import explain_full_disk
 from airborne.motion.run_folder import MOTION, REPORT, RUN_RECORD, SUMMARY, list_figures
 from airborne.run.folder import run_identity
 from airborne.run.track import track_trial
@@ -80,7 +81,7 @@ def do_task(task: Task, report: Report = lambda name, done, total: None) -> Task
     """
     started_s = time.monotonic()
     task.log.parent.mkdir(parents=True, exist_ok=True)
-    with task.log.open("a", encoding="utf-8") as log:
+    with explain_full_disk(task.batch), task.log.open("a", encoding="utf-8") as log:
 
         def note(text: str) -> None:
             log.write(f"{datetime.now():%F %T} {text}\n")

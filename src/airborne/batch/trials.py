@@ -20,6 +20,7 @@ TABLE = "trials.csv"
 _OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
 _MEANT_AS_TRIAL = re.compile(r"^[ \t]*(\[\[camera|session[ \t]*=)", re.MULTILINE)
+_OF_A_SESSION = {"calibration", "body", "athletes"}  # a file with labels and one of these may be what trials share
 _ALIKE = 0.8  # of words; chosen between slips, as difflib measures them (cameras 0.92, camara 0.83), and cam1 (0.6)
 _HEAD_BYTES = 100_000  # of a file that is no TOML, in which words of a trial are looked for
 _TABLE_FORM = "a table of trials has a line of names, one of them trial, then a line for each trial"
@@ -70,8 +71,9 @@ def _is_trial(path: Path) -> bool:
         return False
     except tomllib.TOMLDecodeError:
         return path.name == _ALWAYS_TRIAL or _MEANT_AS_TRIAL.search(_read_head(path)) is not None
-    has_cameras = get_close_matches("camera", tables, cutoff=_ALIKE)
-    return path.name == _ALWAYS_TRIAL or "session" in tables or bool("name" in tables and has_cameras)
+    has_cameras, has_session = (get_close_matches(key, tables, cutoff=_ALIKE) for key in ("camera", "session"))
+    is_labelled = "labels" in tables and not tables.keys() & _OF_A_SESSION
+    return path.name == _ALWAYS_TRIAL or bool(has_session or is_labelled or ("name" in tables and has_cameras))
 
 
 def _read_head(path: Path) -> str:

@@ -42,18 +42,25 @@ _PALM_INWARD = Rotation.from_euler("z", 90, degrees=True).as_matrix()
 _SOLE_LEVEL = Rotation.from_euler("x", FOOT_SLOPE_RAD - np.pi / 2).as_matrix()
 
 
+def require_athlete(stature_m: float, mass_kg: float) -> None:
+    """Raise BodyError for a stature or a mass that no athlete has."""
+    for value, (low, high), name, unit in (
+        (stature_m, _STATURES_M, "stature_m", "metres"),
+        (mass_kg, _MASSES_KG, "mass_kg", "kilograms"),
+    ):
+        if not low <= value <= high:
+            is_cm = unit == "metres" and low <= value / 100 <= high
+            hint = f": is it in centimetres? give {value / 100:g}" if is_cm else ""
+            raise BodyError(f"{name} is {value:g}; expected {low:g} to {high:g} {unit}{hint}")
+
+
 def measurements_of(stature_m: float, mass_kg: float) -> Measurements:
     """Make the measurements of a person of our own proportions.
 
     Lengths are fixed shares of the stature; one factor on all girths, widths and depths gives the mass (it goes with
     the factor's square). Raises BodyError for a stature or a mass that no athlete has.
     """
-    for value, (low, high), name, unit in (
-        (stature_m, _STATURES_M, "stature_m", "metres"),
-        (mass_kg, _MASSES_KG, "mass_kg", "kilograms"),
-    ):
-        if not low <= value <= high:
-            raise BodyError(f"{name} is {value:g}; expected {low:g} to {high:g} {unit}")
+    require_athlete(stature_m, mass_kg)
     girth = float(np.sqrt(mass_kg / (_mass_per_cubic_stature() * stature_m**3)))
     if not _GIRTHS[0] <= girth <= _GIRTHS[1]:
         raise BodyError(

@@ -19,6 +19,18 @@ from airborne.types import Array
 Lens = Literal["brown", "fisheye"]
 
 
+def _check_shape(values: ArrayLike, ending: tuple[int, ...], what: str, meaning: str) -> Array:
+    """Return numbers whose shape ends as it should; raises CalibrationError for anything else."""
+    expected = f"expected (..., {', '.join(map(str, ending))}), {meaning}"
+    try:
+        array = np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise CalibrationError(f"{what} are no array of numbers (found {str(values)[:60]}); {expected}") from None
+    if array.shape[-len(ending) :] != ending:
+        raise CalibrationError(f"{what} have the shape {array.shape}; {expected}")
+    return array
+
+
 def scale_lengths(covariance: Array, factor: float) -> Array:
     """Return a camera's covariance (7, 7) with lengths that are `factor` times as large; see `Camera`."""
     sizes = np.array([1, 1, 1, factor, factor, factor, 1.0])
@@ -79,9 +91,7 @@ class Camera:
 
     def px_from_world(self, points: Array) -> Array:
         """Project points (..., 3) [m] to the image: (..., 2) [px]; NaN behind the camera."""
-        points = np.asarray(points, float)
-        if points.shape[-1:] != (3,):
-            raise CalibrationError(f"points have the shape {points.shape}; expected (..., 3): x, y, z in metres")
+        points = _check_shape(points, (3,), "points", "x, y, z in metres")
         matrix = self.camera_from_world.as_matrix()
         xyz = points @ matrix[:3, :3].T + matrix[:3, 3]
         z = np.where(xyz[..., 2:] > 0, xyz[..., 2:], np.nan)
@@ -89,7 +99,7 @@ class Camera:
 
     def distort_px(self, px: Array) -> Array:
         """Map undistorted pixels (..., 2) to the pixels that the lens gives: (..., 2) [px]."""
-        xy = (np.asarray(px, float) - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
+        xy = (_check_shape(px, (2,), "pixels", "u, v") - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
         return self._distort(xy) @ self.K[:2, :2].T + self.K[:2, 2]
 
     def undistort_px(self, px: Array) -> Array:
@@ -97,7 +107,7 @@ class Camera:
 
         NaN stays NaN; NaN also where the lens model has no inverse.
         """
-        px = np.asarray(px, float)
+        px = _check_shape(px, (2,), "pixels", "u, v")
         if not self.is_distorted:
             return px
         xy = (px - self.K[:2, 2]) @ np.linalg.inv(self.K[:2, :2]).T
@@ -201,6 +211,8 @@ class Rig:
 
     def select(self, names: Sequence[str]) -> Rig:
         """Return the rig of the named cameras, in that order; raises CalibrationError for an unknown name."""
+        if isinstance(names, str):
+            raise CalibrationError(f"select takes a list of names; give ['{names}'], or rig['{names}'] for the camera")
         return Rig(tuple(self[name] for name in names))
 
     @property
@@ -213,8 +225,10 @@ class Rig:
 
         Lens distortion is taken out first; NaN where fewer than two cameras see the point (see `triangulate`).
         """
-        px = np.asarray(px, float)
-        if px.shape[-2:] != (len(self), 2):
-            raise CalibrationError(f"pixels have the shape {px.shape}; expected (..., {len(self)}, 2), a row a camera")
+        px = _check_shape(px, (len(self), 2), "pixels", "a row a camera")
+        if weights is not None:
+            weights = _check_shape(weights, (len(self),), "weights", "one a camera, none below 0")
+            if (weights < 0).any():
+                raise CalibrationError(f"a weight is {weights.min():g}; expected 0 or more")
         undistorted = [camera.undistort_px(px[..., i, :]) for i, camera in enumerate(self.cameras)]
         return triangulate(self.P, np.stack(undistorted, axis=-2), weights)

@@ -22,6 +22,7 @@ from airborne.cameras.formats.vicon import rig_from_vicon, vicon_losses, vicon_t
 from airborne.cameras.formats.xml import parse_xml
 from airborne.cameras.units import FARTHEST_M, check_baselines, longest_baseline_m
 from airborne.errors import CalibrationError
+from airborne.io.names import to_path
 from airborne.io.text import parse_toml, read_bytes, read_text
 from airborne.io.writing import missing_folder, write_text
 from airborne.types import Size
@@ -95,7 +96,7 @@ def build_rig(file: CalibrationFile, options: FileOptions) -> Rig:
 
 def open_calibration(path: str | Path) -> CalibrationFile:
     """Recognise the format of a calibration file. Raises CalibrationError for a file of no known format."""
-    path = Path(path)
+    path = to_path(path)
     where = str(path)
     if path.is_dir():
         return _opencv_calibration(path, where, _opencv_folder(path))
@@ -148,7 +149,9 @@ def write_rig(
     lengths, where the format leaves a choice. pixels: the pixel convention of DLT coefficients; None is DLTdv 8's.
     errors_px: reprojection RMS by camera, written by pose2sim and caliscope. Raises CalibrationError.
     """
-    path = Path(path)
+    path = to_path(path)
+    if not isinstance(rig, Rig):
+        raise CalibrationError(f"write_rig writes a Rig (found {str(rig)[:100]}); give Rig((camera, ...)) for cameras")
     kind = format or format_of_name(path)
     file_unit = _unit(kind, unit)
     texts, notes = _texts(kind, rig, file_unit, pixels=pixels or PixelConvention(), errors_px=errors_px)
@@ -176,7 +179,8 @@ def format_of_name(path: Path) -> str:
         if path.name.lower().endswith(suffix):
             return kind
     raise CalibrationError(
-        f"{path}: the file name does not tell the format; end it in {', '.join(_SUFFIXES)}, or name the format (--to)"
+        f"{path}: the file name does not tell the format; end it in {', '.join(_SUFFIXES)}, or name the format "
+        "(format=..., --to)"
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -24,6 +24,10 @@ _HARDLY_ANY = 0.2  # share within two sds; 0.95 is expected
 _OTHER_WAY = 10.0  # times nearer once turned to what looks the same: no noise does that
 _FAR_MM = 20_000.0  # beyond any error of a body in a hall
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
+_FARTHEST_SHIFT = 3  # periods by which the clocks are shifted relative to each other
+_MOST_FRAMES = 0.9  # shifts that leave fewer of the frames are ignored
+_CLEARLY_BETTER = 0.5  # chosen: of the unshifted distance; a constant error along the motion looks like a shift
+_FEW_TIMES = 3  # chosen: matches at least that speak for milliseconds, and more than twice those in seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +82,8 @@ class MotionComparison:
     n_singular: int  # true tilts near +-90 degrees, where somersault and twist errors mean little
     position_calibration: SdCalibration
     rotation_calibration: SdCalibration
+    better_shift_s: float  # added to the truth's times, this would clearly agree better; whole periods, or 0
+    better_rms_3d_mm: float  # the position's error with that shift
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
@@ -122,6 +128,11 @@ class MotionComparison:
                 )
         if self.position_calibration.n and self.position_calibration.within_2sd < _HARDLY_ANY:
             lines.append("hardly any position lies within 2 sd: is this the reference of this recording, in its world?")
+        if self.better_shift_s:
+            lines.append(
+                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, the RMS in space would be "
+                f"{self.better_rms_3d_mm:.2f} mm: do both clocks start at the same frame?"
+            )
         lines += question_units(position.rms_3d_mm)
         return "\n".join(lines)
 
@@ -160,6 +171,14 @@ def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) ->
     best = int(np.argmin(np.mean(angle**2, axis=0)))
     position_error = motion.position[frames] - truth.position[rows]
     rotation_error = Rotation.from_matrix(nearest_R @ np.swapaxes(true_R, -1, -2)).as_rotvec()
+    position_errors = _position_errors(position_error)
+
+    def rms_at(shift_s: float) -> tuple[float, int]:
+        frames, rows, _ = match_times(motion.time_s, truth.time_s + shift_s)
+        error = (motion.position[frames] - truth.position[rows])[motion.has_pose[frames]]
+        return float(1e3 * _rms(np.linalg.norm(error, axis=-1))) if len(error) else math.nan, len(error)
+
+    shift_s, shifted_mm = best_time_shift(truth.time_s, position_errors.rms_3d_mm, rms_at, _CLEARLY_BETTER)
     return MotionComparison(
         n_frames=len(motion),
         n_truth=len(truth.time_s),
@@ -168,7 +187,7 @@ def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) ->
         n_uncertain=int(np.sum(status == Status.UNCERTAIN.value)),
         n_lost=int(np.sum(status == Status.LOST.value)),
         largest_time_offset_s=float(posed_offset.max()),
-        position=_position_errors(position_error),
+        position=position_errors,
         raw=_orientation_errors(R, true_R),
         modulo_run=_orientation_errors(equivalent_R[:, best], true_R),
         modulo_frame=_orientation_errors(nearest_R, true_R),
@@ -177,11 +196,45 @@ def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) ->
         n_singular=int(np.sum(is_near_singular(angles_from_matrix(true_R)))),
         position_calibration=sd_calibration(position_error, motion.position_sd[frames]),
         rotation_calibration=sd_calibration(rotation_error, motion.rotation_sd[frames]),
+        better_shift_s=shift_s,
+        better_rms_3d_mm=shifted_mm,
     )
 
 
+def best_time_shift(
+    time_s: Array, unshifted_mm: float, error_at: Callable[[float], tuple[float, int]], clearly_better: float
+) -> tuple[float, float]:
+    """Shift a reference's clock by whole periods: return the best shift [s] and its error [mm].
+
+    `error_at` returns the error [mm] with a shift [s] added to its times, and how many values are compared then. The
+    best is 0 unless another leaves less than a share, `clearly_better`, of the error.
+    """
+    if len(time_s) < 2 or math.isnan(unshifted_mm):
+        return 0.0, unshifted_mm
+    period, best, n_unshifted = float(np.median(np.diff(time_s))), (0.0, unshifted_mm), error_at(0.0)[1]
+    for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1):
+        error_mm, n = error_at(step * period)
+        if n >= _MOST_FRAMES * n_unshifted and error_mm < min(best[1], clearly_better * unshifted_mm):
+            best = step * period, error_mm
+    return best
+
+
 def match_times(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Match times: rows of the motion, rows of the truth nearest in time, and their time offsets [s]."""
+    """Match times: rows of the motion, rows of the truth nearest in time, and their time offsets [s].
+
+    Raises ResultError where hardly any match, and many would if the truth's were milliseconds.
+    """
+    matched = _match(time_s, true_time_s)
+    n = len(matched[0])
+    if 2 * n < len(time_s) and len(_match(time_s, true_time_s / 1000)[0]) > max(_FEW_TIMES - 1, 2 * n):
+        raise ResultError(
+            f"the reference's times are {span(true_time_s)}, the run's {span(time_s)}: are they in milliseconds? "
+            "time_s holds seconds; divide it by 1000"
+        )
+    return matched
+
+
+def _match(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     periods = [float(np.median(np.diff(t))) for t in (time_s, true_time_s) if len(t) > 1]
     reach = _SAME_SHARE * min(periods) if periods else _SAME_TIME_S
     rows = np.searchsorted((true_time_s[1:] + true_time_s[:-1]) / 2, time_s)

@@ -12,6 +12,7 @@ from airborne.errors import ResultError
 from airborne.evaluation.columns import align_columns
 from airborne.evaluation.compare import (
     SdCalibration,
+    best_time_shift,
     match_times,
     nan_to_none,
     or_dash,
@@ -25,10 +26,8 @@ from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
 from airborne.tracking import Status
 from airborne.types import Array, Triple
 
-_FARTHEST_SHIFT = 3  # periods by which the clocks are shifted relative to each other
 _CLEARLY_BETTER = 0.98  # of the unshifted distance
 _FAR_M = 0.1  # a joint that far off is misplaced
-_MOST_FRAMES = 0.9  # shifts that leave fewer of the frames are ignored
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,9 +163,13 @@ def compare_joints(
     tracked = replace(pairs, measured=np.where(is_tracked[..., None], pairs.measured, np.nan))
     everything = list(range(len(names)))
     whole = _errors(pairs, everything)
-    shift_s, shifted_mm = _best_time_shift(
-        motion.time_s, reference, measured=measured, R=R, unshifted_mm=whole.mean_without_offset_mm
-    )
+
+    def mean_at(shift_s: float) -> tuple[float, int]:
+        frames, rows, _ = match_times(motion.time_s, reference.time_s + shift_s)
+        local = np.einsum("nlji,nlj->nli", R[frames], measured[frames] - reference.points[rows])
+        return _mean_about(local), int(np.isfinite(local).all(axis=-1).sum())
+
+    shift_s, shifted_mm = best_time_shift(reference.time_s, whole.mean_without_offset_mm, mean_at, _CLEARLY_BETTER)
     return JointComparison(
         n_frames=len(motion),
         n_reference=len(reference.time_s),
@@ -259,34 +262,6 @@ def _mean_about(error: Array) -> float:
     if not error.size:
         return math.nan
     return float(1e3 * np.nanmean(np.linalg.norm(error - np.nanmean(error, axis=0), axis=-1)))
-
-
-def _best_time_shift(
-    time_s: Array, reference: JointPaths, *, measured: Array, R: Array, unshifted_mm: float
-) -> tuple[float, float]:
-    """Shift the reference's clock by whole periods: return the best shift [s] and its error [mm]."""
-    if len(reference.time_s) < 2 or math.isnan(unshifted_mm):
-        return 0.0, unshifted_mm
-    period = float(np.median(np.diff(reference.time_s)))
-    best = 0.0, unshifted_mm
-    _, n_unshifted = _errors_at_shift(time_s, reference, measured=measured, R=R, shift_s=0.0)
-    for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1):
-        local, n = _errors_at_shift(time_s, reference, measured=measured, R=R, shift_s=step * period)
-        if n < _MOST_FRAMES * n_unshifted:
-            continue
-        error_mm = _mean_about(local)
-        if error_mm < min(best[1], _CLEARLY_BETTER * unshifted_mm):
-            best = step * period, error_mm
-    return best
-
-
-def _errors_at_shift(
-    time_s: Array, reference: JointPaths, *, measured: Array, R: Array, shift_s: float
-) -> tuple[Array, int]:
-    """Return the errors in the segments' axes with the reference's clock shifted, and their number."""
-    frames, rows, _ = match_times(time_s, reference.time_s + shift_s)
-    local = np.einsum("nlji,nlj->nli", R[frames], measured[frames] - reference.points[rows])
-    return local, int(np.isfinite(local).all(axis=-1).sum())
 
 
 def _triple(values: Array) -> Triple:

@@ -11,7 +11,7 @@ import numpy as np
 
 from airborne.body import BodyModel
 from airborne.export.takes import Take, part_paths, portable_names
-from airborne.io.writing import write_text
+from airborne.io.writing import replace_text
 from airborne.types import Array
 
 _CM = 100.0  # to a metre: the usual unit of BVH files
@@ -34,7 +34,7 @@ def write_bvh(path: Path, take: Take) -> list[Path]:
         lines = [*lines_above, "MOTION", f"Frames: {rows.stop - rows.start}"]
         lines.append(f"Frame Time: {1 / float(take.rate)!r}")
         lines += [" ".join(f"{x:.6f}" for x in row) for row in values[rows].tolist()]
-        write_text(part, "\n".join(lines) + "\n")
+        replace_text(part, "\n".join(lines) + "\n", is_durable=False)
     return paths
 
 

@@ -20,6 +20,7 @@ from airborne.constants import STANDARD_GRAVITY_M_S2
 from airborne.export.part_meshes import part_colour
 from airborne.export.takes import portable_names
 from airborne.geometry.rotations import angles_from_matrix
+from airborne.io.writing import replace_text
 from airborne.types import Array
 
 _DOCUMENT_VERSION = "40000"  # of the file format: OpenSim 4.0 and later
@@ -57,7 +58,8 @@ def write_osim(path: Path, model: BodyModel) -> None:
         ET.SubElement(marker, "location").text = _numbers(_BODY_FROM_SEGMENT @ landmark.position_m)
         ET.SubElement(marker, "fixed").text = "true"
     ET.indent(document, "\t")
-    path.write_bytes(ET.tostring(document, encoding="UTF-8", xml_declaration=True) + b"\n")
+    text = ET.tostring(document, encoding="UTF-8", xml_declaration=True).decode()
+    replace_text(path, f"{text}\n", is_durable=False)
 
 
 def coordinate_names(model: BodyModel) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from airborne.export.opensim_model import GROUND_FROM_WORLD, coordinate_names
 from airborne.export.takes import Take, part_paths
-from airborne.io.writing import write_text
+from airborne.io.writing import replace_text
 
 
 def write_mot(path: Path, take: Take) -> list[Path]:
@@ -27,5 +27,5 @@ def write_mot(path: Path, take: Take) -> list[Path]:
         head = [part.stem, "version=1", f"nRows={rows.stop - rows.start}", f"nColumns={len(names)}", "inDegrees=yes"]
         lines = [*head, "endheader", "\t".join(names)]
         lines += ["\t".join([f"{time_s:.9f}", *(f"{x:.9g}" for x in row)]) for time_s, *row in values[rows].tolist()]
-        write_text(part, "\n".join(lines) + "\n")
+        replace_text(part, "\n".join(lines) + "\n", is_durable=False)
     return paths

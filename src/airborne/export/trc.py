@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from airborne.export.takes import Take
-from airborne.io.writing import write_text
+from airborne.io.writing import replace_text
 
 _Y_UP = (1, 2, 0)  # TRC's x, y, z are the world's y, z, x
 _HEADER = "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames"
@@ -32,4 +32,4 @@ def write_trc(path: Path, take: Take) -> None:
     for frame, time_s, row in zip(take.frame, take.time_s, values.tolist(), strict=True):
         cells = ("NaN" if x != x else f"{x:.7f}" for x in row)
         lines.append("\t".join([str(frame), f"{time_s:.9f}", *cells]))
-    write_text(path, "\n".join(lines) + "\n")
+    replace_text(path, "\n".join(lines) + "\n", is_durable=False)

@@ -6,11 +6,9 @@ several stages with the name of the stage before them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from inspect import signature
 from numbers import Integral
-from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,10 +22,17 @@ from airborne.calibration import (
 from airborne.calibration import calibrate as calibrate_points
 from airborne.calibration.acceptance import require_plausible
 from airborne.errors import AirborneError, require_choice
-from airborne.io.terminal import Stages
-from airborne.io.terminal import progress as progress_bar
+from airborne.interface.arguments import (
+    FilePath,
+    as_list,
+    check_times,
+    folder_of,
+    report_progress,
+    report_stages,
+)
+from airborne.io.names import to_path
 from airborne.motion.smoothing.smoother import Smoothing
-from airborne.run.evaluate import Comparisons, assess
+from airborne.run.evaluate import AgreementReport, Comparison, assess, evaluate_agreement
 from airborne.run.export import EXPORT_FORMATS, ExportResult
 from airborne.run.export import export_run as write_export
 from airborne.run.own_body import PersonFit, fit_person
@@ -40,8 +45,6 @@ from airborne.trial.file import read_trial as read_trial_file
 from airborne.types import Progress, Size, StageProgress
 
 __all__ = ["calibrate", "evaluate", "export_run", "fit_body", "read_run", "read_trial", "smooth", "synthesise", "track"]
-
-FilePath = str | PathLike[str]
 
 _SCENES = ("cross", "somersault", "block")
 _SMOOTHINGS = ("butterworth", "spline", "kalman")
@@ -56,7 +59,7 @@ def read_trial(path: FilePath, *, cameras: Sequence[str] | None = None, **track:
     >>> trial.track.stop
     3
     """
-    return read_trial_file(Path(path), track, cameras)
+    return read_trial_file(to_path(path), track, cameras)
 
 
 def track(
@@ -79,8 +82,8 @@ def track(
     Run('again'): thrown cross, half-twisting somersault, 5 frames: 5 tracked, 0 uncertain, 0 lost
     """
     trial = trial if isinstance(trial, Trial) else read_trial(trial)
-    with _reporting(progress, f"tracking {trial.name}") as report:
-        track_trial(trial, Path(folder), resume=resume, overwrite=overwrite, pictures=pictures, progress=report)
+    with report_progress(progress, f"tracking {trial.name}") as report:
+        track_trial(trial, to_path(folder), resume=resume, overwrite=overwrite, pictures=pictures, progress=report)
     return read_run(folder)
 
 
@@ -90,7 +93,7 @@ def read_run(folder: FilePath) -> Run:
     >>> read_run("results").summary["n_frames"]
     5
     """
-    return Run(Path(folder).absolute())
+    return Run(to_path(folder).absolute())
 
 
 def calibrate(
@@ -109,16 +112,16 @@ def calibrate(
     >>> rig["cam1"].px_from_world([0.0, 0.0, 1.3]).shape
     (2,)
     """
-    if Path(sources).suffix.lower() == ".toml":
+    if to_path(sources).suffix.lower() == ".toml":
         if sizes is not None:
             raise AirborneError("sizes go with a table of control points; a file of sources has size = [width, height]")
-        with _reporting_stages(progress) as report:
-            found = calibrate_from(read_sources(Path(sources)), report)
+        with report_stages(progress) as report:
+            found = calibrate_from(read_sources(to_path(sources)), report)
         require_plausible(found)
         return found
     if sizes is None:
         raise AirborneError("sizes is missing: give the image size in pixels, such as sizes=(768, 576)")
-    table = read_control_points(Path(sources))
+    table = read_control_points(to_path(sources))
     by_camera = sizes if isinstance(sizes, Mapping) else dict.fromkeys(table.cameras, sizes)
     for size in by_camera.values():
         if not (isinstance(size, Sequence) and len(size) == 2 and all(isinstance(number, Integral) for number in size)):
@@ -149,8 +152,8 @@ def fit_body(
     airborne.errors.TrialError: thrown cross, half-twisting somersault: fitting the body needs known joints; ...
     """
     trial = trial if isinstance(trial, Trial) else read_trial(trial)
-    with _reporting_stages(progress) as report:
-        return fit_person(trial, Path(output), n_frames=n_frames, skeleton=skeleton, progress=report)
+    with report_stages(progress) as report:
+        return fit_person(trial, to_path(output), n_frames=n_frames, skeleton=skeleton, progress=report)
 
 
 def evaluate(
@@ -159,19 +162,35 @@ def evaluate(
     *,
     digitised: FilePath | None = None,
     joints: FilePath | None = None,
-) -> Comparisons:
+    joint_angles: FilePath | None = None,
+    repeats: FilePath | Run | Sequence[FilePath | Run] = (),
+    operators: FilePath | Sequence[FilePath] = (),
+) -> Mapping[str, Comparison | AgreementReport]:
     """Compare a run with the truth, with clicked points, with paths of joints; into its summary too.
 
-    Returns a comparison for each, by name, which describes itself (`.describe()`). Raises
-    ResultError where a file cannot be read, or is of another recording.
+    Returns a comparison for each, by name, which describes itself (`.describe()`). With `joint_angles`, with `repeats`,
+    other runs of the same trial, or `operators`, other people's clicks beside `digitised`, there is `agreement` too: of
+    the run with all of them and between the repetitions, with tables and figures in the run's folder. Raises an
+    AirborneError where a file cannot be read, or is of another recording.
 
     >>> evaluate("results", "truth.csv")["truth"].n_matched
     5
     """
-    if truth is None and digitised is None and joints is None:
-        raise AirborneError("nothing to compare with; give truth, digitised or joints, the path of a table")
-    paths = (None if path is None else Path(path) for path in (truth, digitised, joints))
-    return assess(_folder(run), *paths)
+    references = [None if path is None else to_path(path) for path in (truth, digitised, joints)]
+    angles = None if joint_angles is None else to_path(joint_angles)
+    runs, clicks = ([folder_of(one) for one in as_list(each)] for each in (repeats, operators))
+    is_alone = not any(references)
+    if is_alone and not (angles or runs or clicks):
+        raise AirborneError(
+            "nothing to compare with; give truth, digitised, joints or joint_angles, the path of a table, or repeats"
+        )
+    folder = folder_of(run)
+    comparisons: dict[str, Comparison | AgreementReport] = {} if is_alone else {**assess(folder, *references)}
+    if angles or runs or clicks:
+        comparisons["agreement"] = evaluate_agreement(
+            folder, *references, joint_angles=angles, repeats=runs, operators=clicks
+        )
+    return comparisons
 
 
 def smooth(
@@ -189,8 +208,8 @@ def smooth(
 
     Without a method by the Kalman smoother, as `airborne smooth` does, or with a cut-off by a Butterworth filter. That
     filter without a cut-off gets the one of the residual analysis; gaps up to `fill_s` [s] are filled;
-    `events_s` are the times [s] that no filter crosses, None those that are found. Raises ResultError for what cannot
-    be smoothed so.
+    `events_s` are the times [s] that no filter crosses, [] none, None those that are found. Raises an AirborneError for
+    what cannot be smoothed so.
 
     >>> smooth("results", cutoff_hz=10, events_s=[]).tables["joints"]["velocity"].attrs["units"]
     'm/s'
@@ -200,9 +219,9 @@ def smooth(
     if not isinstance(cutoff_hz, float | int | None):
         raise AirborneError(f"cutoff_hz is {cutoff_hz!r}; expected Hz, or None for that of the residual analysis")
     settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
-    out = None if output is None else Path(output)
-    with _reporting(progress, "smoothing") as report:
-        return smooth_run(_folder(run), settings, events_s=events_s, out=out, progress=report)
+    out, times_s = None if output is None else to_path(output), check_times(events_s)
+    with report_progress(progress, "smoothing") as report:
+        return smooth_run(folder_of(run), settings, events_s=times_s, out=out, progress=report)
 
 
 def export_run(
@@ -218,8 +237,8 @@ def export_run(
     unknown = [format for format in formats if format not in EXPORT_FORMATS]
     if unknown:
         raise AirborneError(f"no format {', '.join(map(str, unknown))}; there are: {', '.join(EXPORT_FORMATS)}")
-    with _reporting_stages(progress) as report:
-        return write_export(_folder(run), None if output is None else Path(output), formats, report)
+    with report_stages(progress) as report:
+        return write_export(folder_of(run), None if output is None else to_path(output), formats, report)
 
 
 def synthesise(
@@ -239,37 +258,16 @@ def synthesise(
     False
     """
     require_choice(scene, _SCENES, "scene")
-    folder, write = Path(folder), write_thrown_cross if scene == "cross" else write_somersault
+    if not isinstance(seed, Integral) or seed < 0:
+        raise AirborneError(f"seed is {seed!r}; expected a whole number, 0 or more")
+    folder, write = to_path(folder), write_thrown_cross if scene == "cross" else write_somersault
     makes = signature(block_scene if scene == "block" else write)
     names = [name for name in makes.parameters if name not in ("folder", "seed", "progress")]
     if unknown := [name for name in options if name not in names]:
         raise AirborneError(f"synthesise has no option {', '.join(unknown)}; it has: {', '.join(names)}")
-    with _reporting(progress, "rendering") as report:
+    with report_progress(progress, "rendering") as report:
         if scene == "block":
             write_block(folder, block_scene(seed, **options), progress=report)
         else:
             write(folder, seed=seed, progress=report, **options)
     return folder / "trial.toml"
-
-
-def _folder(run: Run | FilePath) -> Path:
-    return run.folder if isinstance(run, Run) else Path(run)
-
-
-@contextmanager
-def _reporting(progress: bool | Progress, what: str) -> Iterator[Progress | None]:
-    """Yield what is told of each step: a bar for True, nothing for False, or the function given."""
-    if progress is True:
-        with progress_bar(what) as bar:
-            yield bar
-    else:
-        yield progress or None
-
-
-@contextmanager
-def _reporting_stages(progress: bool | StageProgress) -> Iterator[StageProgress]:
-    if progress is True:
-        with Stages() as bars:
-            yield bars
-    else:
-        yield progress or (lambda what, done, total: None)

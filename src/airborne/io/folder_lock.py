@@ -13,6 +13,7 @@ from pathlib import Path
 
 from airborne.errors import ResultError
 from airborne.io.text import read_text
+from airborne.io.writing import explain_full_disk
 
 try:
     import fcntl
@@ -45,7 +46,8 @@ def sole_writer(folder: Path, address: str = "") -> Iterator[None]:
     try:
         os.ftruncate(file, 0)
         os.write(file, f"{holder}, {address}".rstrip(", ").encode())
-        yield
+        with explain_full_disk(folder):  # of whatever is written meanwhile, also where a file is closed
+            yield
     finally:
         (folder / LOCK).unlink(missing_ok=True)
         os.close(file)

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from typing import Annotated
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Annotated, Any
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BeforeValidator
+
+from airborne.errors import AirborneError
 
 _LONGEST_NAME = 80  # characters
 _LONGEST_PART, _LONGEST_PATH = 255, 1000  # bytes of a file name, and of a path below a folder: of file systems
@@ -44,6 +48,18 @@ def check_path(path: str) -> str:
     return path
 
 
+def to_path(value: Any) -> Path:
+    """Return text or a path object as a Path; raises AirborneError for anything else."""
+    if not isinstance(value, str | PathLike):
+        raise AirborneError(f"expected a path, as text or a Path (found {type(value).__name__} {str(value)[:60]})")
+    return Path(value)
+
+
+def _path_text(path: Any) -> Any:
+    """Return a path object as text, anything else as it is."""
+    return fspath(path) if isinstance(path, PathLike) else path
+
+
 def file_stem(name: str) -> str:
     """Return a name as part of a file's name: as it is, but a long one of many bytes cut, with a digest to tell it."""
     data = check_name(name).encode()
@@ -58,4 +74,4 @@ def _quote(text: str) -> str:
 
 Name = Annotated[str, AfterValidator(check_name)]
 ColumnName = Annotated[str, AfterValidator(check_column)]
-CheckedPath = Annotated[str, AfterValidator(check_path)]
+CheckedPath = Annotated[str, BeforeValidator(_path_text), AfterValidator(check_path)]  # given as text, or as a Path

@@ -22,7 +22,7 @@ def explain_full_disk(path: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno not in _FULL:
             raise
-        free_mb = shutil.disk_usage(path.parent).free / 1e6
+        free_mb = shutil.disk_usage(path if path.is_dir() else path.parent).free / 1e6
         raise ResultError(
             f"{path} cannot be written ({error.strerror}): {free_mb:.0f} MB are free on its disk, or less is granted; "
             "make room and give the command again (track: with --resume)"
@@ -45,9 +45,13 @@ def replace_text(path: Path, text: str, *, is_durable: bool = True) -> None:
     part = path.with_name(f"{path.name}.part")
     with explain_full_disk(path):
         part.unlink(missing_ok=True)  # a killed writer's, or a link that leads elsewhere
-        with part.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            if is_durable:
-                file.flush()
-                os.fsync(file.fileno())
-        part.replace(path)
+        try:
+            with part.open("x", encoding="utf-8", newline="\n") as file:
+                file.write(text)
+                if is_durable:
+                    file.flush()
+                    os.fsync(file.fileno())
+            part.replace(path)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise

@@ -27,6 +27,8 @@ EXPORTS = "export"  # what `export` writes into, where it is told nothing else
 ANGLES, JOINT_ANGLES, FLIGHT = (f"{TABLES}/{name}.csv" for name in ("angles", "joint_angles", "flight"))
 TRACKED_MOTION = f"{TABLES}/tracked_motion.csv"  # before the fit of a whole run, as it was tracked
 SMOOTH_JOINTS = f"{TABLES}/smooth_joints.csv"
+AGREEMENT, REPEATABILITY = (f"{TABLES}/{name}.csv" for name in ("agreement", "repeatability"))
+AGREEMENT_METHODS = "agreement_methods.txt"
 _COUNTS = {"name", "n_frames", "n_tracked", "n_uncertain", "n_lost"}  # that every summary holds
 _TELLING = ("matching.png", "heights.png", "through_mask.png", "pose.png")  # figures that tell most of a run
 
@@ -119,6 +121,10 @@ def _refuse_cut_table(table: Path, n: int, summary: dict[str, Any]) -> None:
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read the summary of a finished run. Raises ResultError where it is missing or damaged."""
     path = folder / SUMMARY
+    if not path.exists() and ((folder / MOTION).is_file() or (folder / JOINTS).is_file()):
+        raise ResultError(
+            f"{folder} has no {SUMMARY}: its run has not finished; go on with resume=True (airborne track --resume)"
+        )
     try:
         summary = read_json(path)
     except (OSError, ValueError) as error:

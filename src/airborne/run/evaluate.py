@@ -49,9 +49,9 @@ from airborne.run.folder import open_results
 from airborne.run.provenance import versions
 from airborne.run.reference_series import body_series, players_series
 
-Comparisons = Mapping[str, MotionComparison | DigitisedComparison | JointComparison | PlayersComparison]
+Comparison = MotionComparison | DigitisedComparison | JointComparison | PlayersComparison
+Comparisons = Mapping[str, Comparison]
 
-_METHODS = "agreement_methods.txt"
 _LARGEST_METHODS_BYTES = 1_000_000  # a hundred comparisons; anything larger was not written here
 
 
@@ -199,11 +199,11 @@ def evaluate_agreement(
     with open_results(out := out or folder):
         files = []
         if agreements:
-            write_agreements(run_folder.tables_of(out) / "agreement.csv", agreements)
-            files.append("tables/agreement.csv")
+            write_agreements(run_folder.tables_of(out).parent / run_folder.AGREEMENT, agreements)
+            files.append(run_folder.AGREEMENT)
         if repeatable:
-            write_repeatability(run_folder.tables_of(out) / "repeatability.csv", repeatable)
-            files.append("tables/repeatability.csv")
+            write_repeatability(run_folder.tables_of(out).parent / run_folder.REPEATABILITY, repeatable)
+            files.append(run_folder.REPEATABILITY)
         for name, series in references.items():
             word = name.split()[-1]
             pairs = zip(series, agreements[name], strict=True)
@@ -218,10 +218,11 @@ def evaluate_agreement(
             {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
             {name: [row for row in rows if row.name in first] for name, rows in repeatable.items()},
             versions(),
-            _read_earlier(out / _METHODS),
+            _read_earlier(out / run_folder.AGREEMENT_METHODS),
         )
-        write_text(out / _METHODS, text)
-    return AgreementReport(agreements, repeatable, first, tuple(left_out), out, (*files, _METHODS))
+        write_text(out / run_folder.AGREEMENT_METHODS, text)
+    wrote = (*files, run_folder.AGREEMENT_METHODS)
+    return AgreementReport(agreements, repeatable, first, tuple(left_out), out, wrote)
 
 
 def _read_earlier(path: Path) -> str:

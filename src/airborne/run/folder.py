@@ -22,6 +22,8 @@ from airborne.motion import drop_rows
 from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.files import copy_motion, remove_motion
 from airborne.motion.run_folder import (
+    AGREEMENT,
+    AGREEMENT_METHODS,
     BODY,
     CALIBRATION,
     CANDIDATES,
@@ -30,6 +32,7 @@ from airborne.motion.run_folder import (
     JOINTS,
     JUMPS,
     MOTION,
+    REPEATABILITY,
     REPORT,
     RUN_RECORD,
     SMOOTH_RECORD,
@@ -62,8 +65,9 @@ def prepare_folder(
 
     Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not.
     A run of one body that differs in keys and masks alone loses the rows that these touch, which are then tracked
-    again. What was made of another motion than the last goes: report, pictures, smoothed tables. Raises ResultError for
-    a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other inputs.
+    again. What was made of another motion than the last goes: report, pictures, smoothed tables, comparisons. Raises
+    ResultError for a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other
+    inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
     foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
@@ -172,8 +176,9 @@ def stretches_of(
 
 
 def _remove_made(folder: Path) -> None:
-    """Remove what is made of a motion: report, pictures and smoothed tables."""
-    for path in (folder / REPORT, folder / SMOOTH_RECORD, *(folder / TABLES).glob("smooth_*")):
+    """Remove what is made of a motion: report, pictures, smoothed tables and comparisons."""
+    made = (REPORT, SMOOTH_RECORD, AGREEMENT, REPEATABILITY, AGREEMENT_METHODS)
+    for path in (*(folder / name for name in made), *(folder / TABLES).glob("smooth_*")):
         path.unlink(missing_ok=True)
     for name in (FIGURES, VIDEOS):
         shutil.rmtree(folder / name, ignore_errors=True)
@@ -251,10 +256,26 @@ def _key_digests(trial: Trial) -> dict[str, str]:
 def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
     """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
     names = [*(camera.video for camera in trial.camera if not live), *trial.input_files, *_further_files(trial)]
-    rest = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
-    start = json.dumps([table and table.model_dump() for table in rest])
-    hashes = {name: file_digest(trial.path(name)) for name in names}
-    return {**hashes, _START_AND_LIGHTS: hashlib.sha256(start.encode()).hexdigest()}
+    return {name: file_digest(trial.path(name)) for name in names} | {_START_AND_LIGHTS: _tables_digest(trial)}
+
+
+def has_other_tables(trial: Trial, folder: Path) -> bool:
+    """Say whether a trial's start, lights, calibration, body or cameras have changed since its run in a folder.
+
+    Not of what lies in files; nor where the start is found, as the run holds it as it was found.
+    """
+    record = folder / RUN_RECORD
+    if trial.start.find or not record.is_file():
+        return False
+    inputs = read_record(record).get("inputs")
+    recorded = inputs.get(_START_AND_LIGHTS) if isinstance(inputs, dict) else None
+    return recorded is not None and recorded != _tables_digest(trial)
+
+
+def _tables_digest(trial: Trial) -> str:
+    tables = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
+    text = json.dumps([table and table.model_dump() for table in tables])
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _further_files(trial: Trial) -> list[str]:

@@ -15,6 +15,7 @@ from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError, one_line
 from airborne.io.folder_lock import find_writer
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
+from airborne.run.folder import has_other_tables
 from airborne.studio.clicks import count_clicked, read_clicked
 from airborne.studio.folder import files_inside, outer_links, path_inside, readable_files
 from airborne.studio.named_files import read_inner_tables, refuse_outer_meshes
@@ -227,11 +228,22 @@ def _start_state(project: Project) -> tuple[StepState, str]:
     return "needs you", "where is the body?"
 
 
+def _is_outdated(project: Project, run: Path) -> bool:
+    """Say whether the trial's tables have changed since a run; no where they cannot be read."""
+    try:
+        return has_other_tables(project.trial(), run)
+    except AirborneError:
+        return False
+
+
 def _run_steps(project: Project) -> Iterator[StudioStep]:
     runs = list_runs(project.folder)
     is_prepared = all(state == "ready" for state, _ in (_cameras_state(project), _body_state(project)))
     finished, says = [run for run in runs if (run / SUMMARY).is_file()], ""
-    if finished:
+    if finished and _is_outdated(project, finished[0]):
+        says = f"{finished[0].name} is of another start, calibration, body or camera than now; track again"
+        yield StudioStep("Track", "/track", "needs you", says)
+    elif finished:
         yield StudioStep("Track", "/track", "ready", finished[0].name)
     elif runs:
         is_going_on = find_writer(runs[0]) is not None

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from itertools import combinations
 
 import numpy as np
 
 from airborne.errors import ResultError
 from airborne.export.page import label
-from airborne.study.curves import NODES, RunCurve, event_times, list_curves, normalise_time, read_curve, sample
+from airborne.study.curves import (
+    NODES,
+    RunCurve,
+    describe_curves,
+    event_times,
+    list_curves,
+    normalise_time,
+    read_curve,
+    sample,
+)
 from airborne.study.random_effects import Cells, Difference, Spread, estimate_difference, within_spread
 from airborne.study.spm import CurveTest, compare_curves
 from airborne.study.trials import Study, StudyTrial
@@ -68,8 +78,14 @@ def compare_trials(
         except ResultError as error:
             left_out.append(str(error))
     if not curves:
-        known = [*study.columns, *list_curves(study.trials[0])]
-        raise ResultError(f"{variable}: {left_out[0]}; numbers and curves here: {', '.join(known)}"[:1000])
+        known = [*study.columns, *(name for trial in study.trials for name in list_curves(trial))]
+        if variable in known:
+            raise ResultError(f"{variable}: it can be compared in no trial; the first: {left_out[0]}")
+        alike = "".join(f", did you mean {name}?" for name in get_close_matches(variable, known, 1))
+        raise ResultError(
+            f"{variable} is no number or curve of these trials{alike or ';'} numbers: {', '.join(study.columns)}; "
+            f"{describe_curves(study.trials[0])}"
+        )
     axis, sampled = _sample_all([each[1:] for each in curves], real_time=real_time)
     name = "time [s]" if real_time else f"{' to '.join(events)} [%]"
     values, variances = np.stack([each[0] for each in sampled]), np.stack([each[1] for each in sampled])
@@ -91,10 +107,10 @@ def _sample_all(
 
 
 def _compare_numbers(study: Study, variable: str) -> VariableComparison:
-    trials = [trial for trial in study.trials if trial.number(variable) is not None]
+    trials = [trial for trial in study.trials if trial.measured(variable) is not None]
     left_out = [f"{trial.name}: no {variable}" for trial in study.trials if trial not in trials]
     values = np.array([[trial.number(variable)] for trial in trials], float)
-    sd = np.array([[trial.number(f"{variable}_sd") or 0.0] for trial in trials])
+    sd = np.array([[trial.measured(f"{variable}_sd") or 0.0] for trial in trials])
     return _compare(study, trials, variable, values, sd**2, axis=None, axis_label="", left_out=left_out)
 
 

@@ -60,17 +60,37 @@ def read_curve(trial: StudyTrial, variable: str) -> RunCurve:
     listed = list_curves(trial)
     if variable in listed:  # of players, and none of them is this athlete
         raise ResultError(f"{trial.name}: its run has no player '{trial.athlete}'; name players as their athletes")
-    raise ResultError(f"{trial.name}: its run has no variable '{variable}'; it has: {', '.join(listed[:40])}")
+    raise ResultError(f"{trial.name}: its run has no variable '{variable}'")
 
 
 def list_curves(trial: StudyTrial) -> list[str]:
     """Return the names of all curves of a trial's run."""
+    of_joints = [
+        f"{joint}_{axis}_{unit}"
+        for name, (unit, _) in _LONG.items()
+        for joint in _list_joints(trial, name)
+        for axis in "xyz"
+    ]
+    return _list_columns(trial) + of_joints
+
+
+def describe_curves(trial: StudyTrial) -> str:
+    """Say which curves a trial's run has, each joint once."""
+    of_joints = [
+        f"; <joint>_x_{unit} of {', '.join(joints)}"
+        for name, (unit, _) in _LONG.items()
+        if (joints := _list_joints(trial, name))
+    ]
+    return f"curves: {', '.join(_list_columns(trial)) or 'none'}{''.join(of_joints)}"
+
+
+def _list_columns(trial: StudyTrial) -> list[str]:
     wide = [column for name in _WIDE for column in _read(trial.folder / name)]
-    names = [each for each in wide if not each.endswith("_sd") and each not in ("frame", "time_s", "is_singular")]
-    for name, (unit, _) in _LONG.items():
-        joints = dict.fromkeys(_read(trial.folder / name).get("joint", np.array([])).tolist())
-        names += [f"{joint}_{axis}_{unit}" for joint in joints for axis in "xyz"]
-    return names
+    return [each for each in wide if not each.endswith("_sd") and each not in ("frame", "time_s", "is_singular")]
+
+
+def _list_joints(trial: StudyTrial, table: str) -> list[str]:
+    return list(dict.fromkeys(_read(trial.folder / table).get("joint", np.array([])).tolist()))
 
 
 def event_times(trial: StudyTrial, curve: RunCurve, events: Sequence[str]) -> list[float]:
@@ -84,7 +104,7 @@ def event_times(trial: StudyTrial, curve: RunCurve, events: Sequence[str]) -> li
         if name in ("start", "end"):
             time_s = float(curve.time_s[0 if name == "start" else -1])
         elif name in _OF_THE_ROW:
-            stated = trial.number(_OF_THE_ROW[name])
+            stated = trial.measured(_OF_THE_ROW[name])
             time_s = np.nan if stated is None else stated
         else:
             time_s = _turn_s(trial, int(name.removeprefix("turn-")), times[0] if times else float(curve.time_s[0]))

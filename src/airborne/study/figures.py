@@ -13,7 +13,7 @@ from airborne.export import panels
 from airborne.export.page import label
 from airborne.io.figures import save_png
 from airborne.study.comparison import Contrast, VariableComparison
-from airborne.study.spm import format_p
+from airborne.study.spm import NOT_TESTED, format_p
 from airborne.types import Array
 
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
@@ -47,18 +47,18 @@ def _curves(comparison: VariableComparison, axis: Array) -> Figure:
     panels.label_panel(grid[0], comparison.title)
     grid[0].legend(fontsize=panels.FONT_PT - 1, frameon=False, labelcolor=panels.TEXT)
     for contrast, upper, lower in zip(contrasts, grid[1::2], grid[2::2], strict=True):
-        _draw_difference(upper, axis, contrast)
+        _draw_difference(upper, axis, contrast, comparison.title)
         _draw_test(lower, axis, contrast)
     grid[-1].set_xlabel(comparison.axis_label, fontsize=panels.FONT_PT, color=panels.TEXT)
     return figure
 
 
-def _draw_difference(axes: Axes, axis: Array, contrast: Contrast) -> None:
+def _draw_difference(axes: Axes, axis: Array, contrast: Contrast, title: str) -> None:
     difference = contrast.difference
     axes.axhline(0, color=_GREY, linewidth=0.6)
     axes.fill_between(axis, difference.low, difference.high, color=_GREY, alpha=0.15, linewidth=0)
     axes.plot(axis, difference.value, color=_GREY)
-    panels.label_panel(axes, f"{contrast.b} minus {contrast.a}, 95 %")
+    panels.label_panel(axes, f"{contrast.b} minus {contrast.a}\n{title}, 95 %")
 
 
 def _draw_test(axes: Axes, axis: Array, contrast: Contrast) -> None:
@@ -76,6 +76,8 @@ def _draw_test(axes: Axes, axis: Array, contrast: Contrast) -> None:
         axes.annotate(
             format_p(p), (at, 0.02), xycoords=("data", "axes fraction"), ha="center", fontsize=panels.FONT_PT - 1
         )
+    if not np.isfinite(test.threshold):
+        axes.annotate(NOT_TESTED, (0.5, 0.6), xycoords="axes fraction", ha="center", fontsize=panels.FONT_PT)
     panels.label_panel(axes, "SPM{t}")
 
 

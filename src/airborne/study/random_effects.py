@@ -64,7 +64,10 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spread:
-    """How much trials of one athlete in one condition differ (nodes,), and how much of it the measurement explains."""
+    """How much trials of one athlete in one condition differ (nodes,), and how much of it the measurement explains.
+
+    All but what the runs state is NaN where no athlete has two trials in a condition.
+    """
 
     sd_within: Array  # of single trials, the measurement included
     sd_trials: Array  # without it
@@ -73,14 +76,8 @@ class Spread:
 
 
 def within_spread(cells: Cells) -> Spread:
-    """Pool the variance of trials within athletes and conditions; where none is repeated, the measurement's alone."""
-    squares, freedom = np.zeros(cells.values.shape[1]), 0
-    for athlete, condition in sorted(set(zip(cells.athlete.tolist(), cells.condition.tolist(), strict=True))):
-        own = cells.values[(cells.athlete == athlete) & (cells.condition == condition)]
-        squares += np.sum((own - own.mean(axis=0)) ** 2, axis=0)
-        freedom += len(own) - 1
-    stated = cells.variance.mean(axis=0)
-    within = squares / freedom if freedom else stated
+    """Return how much trials differ within athletes and conditions, and the least change of one that can be told."""
+    within, stated = _pooled_variance(cells), _stated_variance(cells)
     return Spread(
         sd_within=np.sqrt(within),
         sd_trials=np.sqrt(np.maximum(within - stated, 0)),
@@ -89,13 +86,29 @@ def within_spread(cells: Cells) -> Spread:
     )
 
 
+def _stated_variance(cells: Cells) -> Array:
+    """Return the variance of the measurement (nodes,), as the runs state it."""
+    return cells.variance.mean(axis=0)
+
+
+def _pooled_variance(cells: Cells) -> Array:
+    """Return the variance of trials (nodes,), pooled within athletes and conditions; NaN where none is repeated."""
+    squares, freedom = np.zeros(cells.values.shape[1]), 0
+    for athlete, condition in sorted(set(zip(cells.athlete.tolist(), cells.condition.tolist(), strict=True))):
+        own = cells.values[(cells.athlete == athlete) & (cells.condition == condition)]
+        squares += np.sum((own - own.mean(axis=0)) ** 2, axis=0)
+        freedom += len(own) - 1
+    return squares / freedom if freedom else np.full(squares.shape, np.nan)
+
+
 def estimate_difference(cells: Cells, a: int, b: int) -> Difference:
     """Estimate condition `b` minus condition `a`.
 
     Within athletes where two or more have both; else between athletes; of one athlete between trials, and then of that
-    athlete only.
+    athlete only. Where no trial is repeated, the variance of one is the measurement's.
     """
-    within = within_spread(cells).sd_within ** 2
+    pooled_variance = _pooled_variance(cells)
+    within = np.where(np.isnan(pooled_variance), _stated_variance(cells), pooled_variance)
     of_a, of_b = cells.athletes_in(a), cells.athletes_in(b)
     both = np.intersect1d(of_a, of_b)
     if len(both) >= _FEWEST:

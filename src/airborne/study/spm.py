@@ -17,6 +17,7 @@ from airborne.study.random_effects import Difference
 from airborne.types import Array, Mask
 
 _FEWEST_NODES = 5  # of a curve that can be tested
+NOT_TESTED = "could not be tested: too few, or all the same"
 _FEWEST = 3  # athletes or trials a sample: residuals need some
 
 

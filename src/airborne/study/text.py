@@ -9,7 +9,7 @@ import numpy as np
 from airborne import __version__
 from airborne.errors import count
 from airborne.study.comparison import ALPHA, Contrast, VariableComparison
-from airborne.study.spm import format_p
+from airborne.study.spm import NOT_TESTED, format_p
 
 _REFERENCES = {
     "random effects": (
@@ -32,7 +32,10 @@ _LEVELS = {
     "between trials": "between the trials of one athlete, and so of that athlete only",
 }
 
-_NOT_TESTED = "could not be tested: too few, or all the same"
+_NOT_REPEATED = (
+    "how much trials differ, and the minimal detectable change, need two trials of an athlete in a condition, and none "
+    "has two"
+)
 
 
 def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[str], *, real_time: bool) -> str:
@@ -47,11 +50,19 @@ def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[s
         text.append(
             f"Curves were normalised in time, piecewise linearly between {', '.join(events)}, to 101 nodes a stretch."
         )
+    are_repeated = [bool(np.isfinite(each.spread.mdc).any()) for each in comparisons]
+    if any(are_repeated):
+        text.append(
+            "Each athlete's mean in each condition has the variance of a mean of his trials, pooled within athletes "
+            "and conditions, which holds the error of the measurement."
+        )
+    if not all(are_repeated):
+        text.append(
+            "Where no athlete has two trials in a condition, each mean has the variance of the measurement alone."
+        )
     text.append(
-        "Each athlete's mean in each condition has the variance of a mean of his trials, pooled within athletes and "
-        "conditions, which holds the error of the measurement. Differences of conditions were pooled over athletes "
-        "with random effects: the variance between athletes by Paule and Mandel (1982), 95 % intervals by Hartung and "
-        "Knapp (2001) with Student's t."
+        "Differences of conditions were pooled over athletes with random effects: the variance between athletes by "
+        "Paule and Mandel (1982), 95 % intervals by Hartung and Knapp (2001) with Student's t."
     )
     if "between trials" in levels:
         text.append("With a single athlete, the interval is Welch's, of trials, and holds for that athlete only.")
@@ -62,10 +73,11 @@ def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[s
             "Curves of the athletes' means were compared by two-sided t-tests with one-dimensional statistical "
             f"parametric mapping (Pataky 2012, spm1d), alpha = {ALPHA:g} for all pairs of conditions together."
         )
-    text.append(
-        "The minimal (smallest) detectable change of a single trial is 1.96 sqrt(2) times the standard deviation "
-        "within athletes and conditions."
-    )
+    if any(are_repeated):
+        text.append(
+            "The minimal (smallest) detectable change of a single trial is 1.96 sqrt(2) times the standard deviation "
+            "within athletes and conditions."
+        )
     lines = ["Methods", " ".join(text), "", "Results"]
     lines += [f"{each.title}: {sentence}" for each in comparisons for sentence in _results(each)]
     left_out = list(dict.fromkeys(line for each in comparisons for line in each.left_out))
@@ -97,6 +109,8 @@ def _results(comparison: VariableComparison) -> list[str]:
     stated = "the runs state none for the measurement"
     if measured:
         stated = f"the runs state {measured:.3g} for the measurement, errors included that trials share"
+    if np.isnan(within):
+        return [*sentences, f"{_NOT_REPEATED} ({where}{stated})."]
     sentences.append(
         f"{where}standard deviation of trials of one athlete and condition {within:.3g} ({stated}); minimal detectable "
         f"change of a trial {mdc:.3g}."
@@ -108,7 +122,7 @@ def _number(contrast: Contrast, comparison: VariableComparison) -> str:
     difference, level, p = contrast.difference, _describe_level(contrast, comparison), contrast.p_holm
     assert p is not None, "a number has one"
     if not np.isfinite(p):
-        return f"{contrast.b} minus {contrast.a} is {difference.value[0]:.4g} and {_NOT_TESTED}; {level}."
+        return f"{contrast.b} minus {contrast.a} is {difference.value[0]:.4g} and {NOT_TESTED}; {level}."
     return (
         f"{contrast.b} minus {contrast.a} {difference.value[0]:.4g}, 95 % interval {difference.low[0]:.4g} to "
         f"{difference.high[0]:.4g}, {format_p(p)}; {level}."
@@ -120,7 +134,7 @@ def _curve(contrast: Contrast, comparison: VariableComparison) -> str:
     assert test is not None and axis is not None, "a curve has a test"
     level = _describe_level(contrast, comparison)
     if not np.isfinite(test.threshold):
-        return f"{contrast.b} minus {contrast.a} {_NOT_TESTED}; {level}."
+        return f"{contrast.b} minus {contrast.a} {NOT_TESTED}; {level}."
     if not test.clusters:
         return f"{contrast.b} and {contrast.a} do not differ anywhere, |t| below {test.threshold:.3g}; {level}."
     nodes = np.arange(len(axis))

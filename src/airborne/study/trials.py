@@ -13,6 +13,7 @@ from airborne.io.text import read_csv
 
 ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
 LARGEST = 1e100  # no measurement is larger, and its square is still a number
+_EMPTY = ("", "nan")  # cells without a number
 _FORM = "the table of a batch has columns trial, athlete, condition, status, folder"
 _NEEDED = {"trial", "status", "error", "folder", CONDITION}
 
@@ -34,6 +35,17 @@ class StudyTrial:
         except (KeyError, ValueError):
             return None
         return value if abs(value) < LARGEST else None
+
+    def measured(self, name: str) -> float | None:
+        """Return a number of the row; None where the cell is empty; raises ResultError for anything else."""
+        value = self.number(name)
+        cell = self.row.get(name, "")
+        if value is None and cell.lower() not in _EMPTY:
+            raise ResultError(
+                f"{TABLE}, row of trial {self.name}, column {name}: expected a number or nothing "
+                f"(found '{cell[:60]}'); correct it, or give the batch again"
+            )
+        return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +69,10 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
     The athlete of a run of players is the one who jumped highest, where no label says it. Raises ResultError where the
     folder holds no table, or none of the trials can be compared.
     """
+    if folder.is_dir() and not (folder / TABLE).exists():
+        raise ResultError(
+            f"{folder} has no {TABLE}; give the folder of a batch, or give a batch that was stopped again, to its end"
+        )
     (_, names), *lines = read_csv(folder / TABLE, _FORM, ResultError) or [(1, [""])]
     if not set(names) >= _NEEDED or len(set(names)) < len(names):
         raise ResultError(

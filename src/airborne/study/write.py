@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, ResultError
 from airborne.io.names import file_stem
 from airborne.io.writing import write_text
+from airborne.motion.run_folder import RUN_RECORD
 from airborne.motion.tables import cell
 from airborne.study.comparison import VariableComparison, compare_trials
 from airborne.study.curves import require_events
@@ -36,13 +37,16 @@ def write_comparison(
 ) -> str:
     """Compare variables across the trials of a batch's folder, write tables, figures and text, and return the text.
 
-    Raises AirborneError where a variable is unknown or there are too few trials, conditions or events.
+    Raises AirborneError where a variable is unknown or there are too few trials, conditions or events, and for a
+    folder that holds a run.
     """
     require_events(events)
     try:
         stems = [file_stem(variable) for variable in variables]
     except ValueError as error:
         raise AirborneError(f"--variable: {error}") from None
+    if (folder / RUN_RECORD).is_file():
+        raise ResultError(f"{folder} holds a run; give another folder (-o)")
     study = read_study(batch, conditions)
     check_spm1d()
     compared = [compare_trials(study, variable, events, real_time=real_time) for variable in variables]

@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from airborne.body.anthropometry import require_athlete
+from airborne.errors import BodyError
 from airborne.io.names import CheckedPath
 from airborne.trial.table import SettingsTable
 
@@ -31,6 +33,11 @@ class BodyTable(SettingsTable):
             raise ValueError('preset = "legs" takes no stature_m and no mass_kg; remove them')
         if any(size is None for size in sizes) if self.preset == "human18" else any(size is not None for size in sizes):
             raise ValueError("stature_m and mass_kg go with a preset, both of them, and with nothing else")
+        if self.stature_m is not None and self.mass_kg is not None:
+            try:
+                require_athlete(self.stature_m, self.mass_kg)
+            except BodyError as error:
+                raise ValueError(str(error)) from None
         return self
 
     @property

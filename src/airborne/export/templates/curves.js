@@ -32,7 +32,9 @@ export function drawCurves(canvas, data, now) {
   pen.moveTo(at, TOP - 4);
   pen.lineTo(at, box.height - BOTTOM + 2);
   pen.stroke();
-  const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${data.status[row]}${namesOf(data, row)}`;
+  const [names, all] = row < 0 ? ["", ""] : [namesOf(data, row, MOST_NAMES), namesOf(data, row, Infinity)];
+  canvas.title = names === all ? "" : all.trim();
+  const time = row < 0 ? "" : `   ${data.time_s[row].toFixed(3)} s   ${data.status[row]}${names}`;
   pen.fillStyle = "#5d666f";
   pen.font = FONT;
   pen.fillText(`frame ${now}${time}${data.is_provisional ? "   ± is not final: it grows when the run ends" : ""}`, LEFT, box.height - 4);
@@ -76,12 +78,12 @@ function drawStill(pen, box, data) {
   });
 }
 
-// Which joints or players are worse than tracked in a row, where not all of them are.
-function namesOf({ status, strips = [] }, row) {
+// Which joints or players are worse than tracked in a row, so many of each kind, where not all of them are.
+function namesOf({ status, strips = [] }, row, most) {
   if (status[row] === "lost") return "";
   const of = (rank) => strips.filter((each) => each.rank[row] === String(rank)).map((each) => each.name.replaceAll("_", " "));
   const told = RANKS.map((name, rank) => [name, rank ? of(rank) : []]).filter(([, names]) => names.length);
-  const list = (names) => names.slice(0, MOST_NAMES).join(", ") + (names.length > MOST_NAMES ? ", ..." : "");
+  const list = (names) => names.slice(0, most).join(", ") + (names.length > most ? ", ..." : "");
   return told.map(([name, names]) => `   ${name}: ${list(names)}`).join("");
 }
 

@@ -15,6 +15,7 @@ from airborne.studio.strips import doubtful_frames
 from airborne.studio.view import CameraViews
 
 _KEYS = {"a": "uncertain", "r": "lost"}  # as amber and red
+_LABELS = {"uncertain": "uncertain", "lost": "lost or unseen"}
 _UNSEEN = {"uncertain": "", "lost": ", or a joint that no picture shows"}
 
 
@@ -32,7 +33,7 @@ class Jumps:
         """Lay the buttons out, and listen to the keys."""
         ui.keyboard(on_key=self.press, ignore=["input", "select", "textarea"])
         for key, what in _KEYS.items():
-            button = ui.button(f"Next {what}", on_click=lambda _, to=what: self.go(to)).props("flat")
+            button = ui.button(f"Next {_LABELS[what]}", on_click=lambda _, to=what: self.go(to)).props("flat")
             self._buttons[what] = button.tooltip(
                 f"frames with a {what} body, joint or player{_UNSEEN[what]}; key {key.upper()}"
             )
@@ -53,7 +54,7 @@ class Jumps:
             found = await in_thread(doubtful_frames, run, says="reading the run")
             for what, frames in found.items() if run == self._run else ():
                 self._buttons[what].set_enabled(len(frames) > 0)
-                self._buttons[what].set_text(f"Next {what}: {len(frames) or 'none'}")
+                self._buttons[what].set_text(f"Next {_LABELS[what]}: {len(frames) or 'none'}")
 
     async def press(self, event: KeyEventArguments) -> None:
         """Jump by key."""
@@ -69,7 +70,7 @@ class Jumps:
             with show_errors():
                 frames = (await in_thread(doubtful_frames, self._run, says="reading the run"))[what]
                 if not len(frames):
-                    complain(f"in no frame of this run is anything {what}")
+                    complain(f"in no frame of this run is anything {_LABELS[what]}")
                     return
                 now = await self.view.latest_frame()
                 left = frames[frames < now][::-1] if is_back else frames[frames > now]
