@@ -123,10 +123,12 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
         for warning in cameras[1].warnings if cameras is not None and cameras[1] is not None else ():
             checks.add(f"note: {warning}")
     if not trial.has_players and _exists(trial, body.source_file):
-        checks.attempt(
+        model = checks.attempt(
             trial.model,
             lambda model: "; ".join([f"body: {model.name}, {count(len(model.segments), 'segment')}", *model.notes]),
         )
+        for note in () if model is None else body.doubts(model):
+            checks.add(f"note: {note}")
     if detections is not None and facts and _exists(trial, detections):
         checks.attempt(
             lambda: read_trial_detections(shown, tuple(facts.values())), lambda _: f"detections: {detections}"

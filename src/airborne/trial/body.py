@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from airborne.body import BodyModel
+from airborne.body.density import doubt_build, doubt_mass
 from airborne.io.names import CheckedPath
 from airborne.trial.table import SettingsTable
 
@@ -32,6 +34,12 @@ class BodyTable(SettingsTable):
         if any(size is None for size in sizes) if self.preset == "human18" else any(size is not None for size in sizes):
             raise ValueError("stature_m and mass_kg go with a preset, both of them, and with nothing else")
         return self
+
+    def doubts(self, model: BodyModel) -> list[str]:
+        """Return what is odd about the mass of its body, or of what has been fitted from it: sentences."""
+        is_stated = self.stature_m is not None and self.mass_kg is not None
+        of_build = doubt_build(self.stature_m, self.mass_kg) if is_stated else ()
+        return [*of_build, *doubt_mass(model)]
 
     @property
     def source_file(self) -> str | None:
