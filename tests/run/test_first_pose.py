@@ -172,6 +172,7 @@ def test_a_point_that_cannot_be_right_is_a_mistake_and_a_wrong_stature_a_doubt(t
     written = ", ".join(f"{name} = {place}" for name, place in small.items())
     result = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
     assert not result.mistakes and result.notes[0].endswith("; check the points and the body's size")
+    assert result.doubts == result.notes[:1]
 
 
 def test_points_clicked_in_the_images(trial, tmp_path):

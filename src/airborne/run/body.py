@@ -24,12 +24,11 @@ from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
-from airborne.motion.flight.momentum_table import wrong_flight
 from airborne.motion.joints import doubtful_segments
 from airborne.motion.run_folder import BODY, MOTION, TRACKED_MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
 from airborne.run.body_passes import BodyPasses
-from airborne.run.body_tables import write_tables
+from airborne.run.body_tables import missing_masses, write_tables
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose, out_of_sight
@@ -71,6 +70,7 @@ class BodyRun:
     found: FoundStart | None = None  # where the start was looked for
     keys: Mapping[int, PoseEvidence] = field(default_factory=dict)  # of later frames, in the order of time
     points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], as the start marks them
+    doubts: tuple[str, ...] = ()  # of the first pose, sentences
     kept: KeptFrames = field(default_factory=KeptFrames)  # grows while the run is tracked
 
     table = MOTION
@@ -80,10 +80,11 @@ class BodyRun:
         """Read the body and find its first pose, whose notes become events of the recording."""
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
-        found_notes = () if found is None else (found.note,)
         keys, missed = keys_of_frames(trial, model, opened.recording)
-        opened.recording.events.extend([*model.notes, *found_notes, *first.notes, *first.mistakes, *missed])
-        return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first.points)
+        notes = [*([] if found is None else [found.note]), *(note for note in first.notes if note not in first.doubts)]
+        opened.recording.events.extend([*model.notes, *notes, *missed])
+        doubts, points = (*first.doubts, *first.mistakes), first.points
+        return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, points, doubts)
 
     @property
     def n_frames(self) -> int | None:
@@ -242,8 +243,7 @@ class BodyRun:
         measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
-        of_fall = wrong_flight(motion, measured.flight)
-        findings = [*([of_fall.to_dict()] if of_fall else []), *checked.findings]
+        findings = [*([measured.wrong_fall.to_dict()] if measured.wrong_fall else []), *checked.findings]
         self.recording.events.extend([*checked.doubts, *far_keys(self.trial, model, motion, rig)])
         if not motion.count(Status.TRACKED) and len(motion) > 1:
             args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
@@ -297,4 +297,4 @@ class BodyRun:
 
     def warnings(self) -> list[str]:
         """Return what a reader of the numbers must know beside the uncertainty."""
-        return []
+        return [*self.doubts, *self.trial.body.doubts(self.model), *missing_masses(self.model)]

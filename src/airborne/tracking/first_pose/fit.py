@@ -38,6 +38,7 @@ class FirstPose:
 
     pose: Pose
     notes: tuple[str, ...] = ()  # what the user should know, one line each
+    doubts: tuple[str, ...] = ()  # those of the notes that say what may be wrong
     mistakes: tuple[str, ...] = ()  # points that cannot be right
     points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], those that were given
 
@@ -116,7 +117,8 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
         f"{where}: {fit.note}" if fit.note else "",
     ]
     given = {name: point for name, point in targets.items() if np.isfinite(point).all()}
-    return FirstPose(fit.pose, tuple(note for note in notes if note), tuple(mistakes), given)
+    doubts = [note for note, is_doubt in zip(notes, (doubt, "", fit.note), strict=True) if is_doubt]
+    return FirstPose(fit.pose, tuple(note for note in notes if note), tuple(doubts), tuple(mistakes), given)
 
 
 def check_landmark_names(model: BodyModel, where: str, names: Sequence[str]) -> None:
