@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Box, Ellipsoid, Inertia, Landmark, Mesh, Part, Pose, Segment, human18
-from airborne.body.shaping import length_axis, stretch_mesh, with_girths, with_mass, with_segment_lengths
+from airborne.body.shaping import length_axis, stretch_mesh, with_girths, with_mass, with_segment_lengths, with_size
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
@@ -51,6 +51,18 @@ def test_a_scale_is_undone_by_its_inverse_and_two_are_their_product(change):
     there = change(model, EVERY)
     same_model(change(there, {name: 1 / scale for name, scale in EVERY.items()}), model)
     same_model(change(there, {"thigh": 0.9, "hand": 1.1}), change(model, EVERY | {"thigh": 0.9, "hand": 1.43}))
+
+
+def test_a_larger_body_is_larger_in_all_directions_and_heavier_at_constant_density():
+    model, larger = human18(), with_size(human18(), 1.2)
+    for name, at in positions(model).items():
+        np.testing.assert_allclose(positions(larger)[name], 1.2 * at, atol=EXACT)
+    thigh, own = segment(larger, "thigh_left").inertia, segment(model, "thigh_left").inertia
+    np.testing.assert_allclose(thigh.mass_kg, 1.2**3 * own.mass_kg)
+    np.testing.assert_allclose(thigh.tensor_kg_m2, 1.2**5 * own.tensor_kg_m2)
+    same_model(with_size(larger, 1 / 1.2), model)
+    with pytest.raises(BodyError, match="size is 20 times the body's"):
+        with_size(model, 20)
 
 
 def test_a_longer_thigh_lowers_knee_and_foot_and_nothing_else():

@@ -9,6 +9,7 @@ from airborne.body.shaping import with_joint_widths
 from airborne.body_fitting.checks import (
     check_joints,
     check_lengths,
+    height_ratio,
     length_ratios,
     person_of_shares,
     points_of_lengths,
@@ -26,7 +27,11 @@ def in_cam2(points):
 
 
 def check(lengths, look=in_cam2):
-    return check_lengths(length_ratios(with_segment_lengths(BODY, lengths), BODY), POINTS, look)
+    return check_body(with_segment_lengths(BODY, lengths), BODY, look)
+
+
+def check_body(own, shares, look=in_cam2):
+    return check_lengths(length_ratios(own, shares), POINTS, look, height_ratio(own, shares))
 
 
 def test_lengths_are_measured_by_the_points_at_their_ends():
@@ -63,8 +68,38 @@ def test_impossible_lengths_are_refused_and_named():
 
 
 def test_lengths_that_are_all_off_alike_question_the_stature_and_the_scale():
-    with pytest.raises(BodyError, match=r"all lengths are about 1\.40 of it: check the stature, and the calibration's"):
+    with pytest.raises(
+        BodyError, match=r"of the person is about 1\.39 times as tall .*: check the stature, and the cal"
+    ):
         check({stem: 1.4 for stem in POINTS if "width" not in stem})
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_wrong_stature_is_named_before_the_clicks(share):
+    (warning,) = check_body(human18(1.7, 65.0), human18(1.7 * share, 65.0))
+    assert warning.startswith(
+        f"all of the person is about {1 / share:.2f} times as tall as the stature says: check the"
+    )
+
+
+def test_lengths_that_a_wrong_stature_does_not_explain_are_named_with_their_clicks():
+    long_arms = with_segment_lengths(human18(1.7, 65.0), {"upper_arm": 1.16})
+    (warning,) = check_body(long_arms, human18(1.7 * 0.9, 65.0))
+    assert "about 1.11 times as tall" in warning and "check the clicks" not in warning
+    assert warning.endswith("then the clicks of shoulder, elbow, first in cam2 (shoulder elbow)")
+
+
+def test_a_stature_that_is_a_little_off_is_taken_without_a_word():
+    assert check_body(human18(1.7, 65.0), human18(1.7 * 1.04, 65.0)) == []
+
+
+def test_widths_alone_that_are_off_question_the_mass():
+    (warning,) = check_body(human18(1.7, 65.0), human18(1.7, 65.0 * 1.6))
+    assert "widths go with the mass, of which about 0.63 would fit: check the mass, then the clicks of" in warning
+    with pytest.raises(
+        BodyError, match=r"of which about 0\.45 would fit, as if it were given in pounds: check the mass"
+    ):
+        check_body(human18(1.7, 65.0), human18(1.7, 65.0 * 2.2046))
 
 
 def test_a_body_is_compared_with_the_person_of_its_own_height():

@@ -96,6 +96,8 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
         "<h2>Centre of mass and angular momentum</h2>",
         "<dt>Joint angles</dt>",
         "a free fall [mm]",
+        "mean over the frames, standard deviation of its error",
+        "its scatter from frame to frame about x",
     )
     assert [word for word in words if word not in html] == []
     assert html.count("<img") == 5

@@ -36,6 +36,16 @@ def test_median_sd_is_infinite_where_most_frames_do_not_show_a_direction():
     assert (head["n_rotation_unobservable"], head["n_position_unobservable"]) == (6, 0)
 
 
+def test_turns_are_counted_between_the_first_and_the_last_pose_that_shows_them():
+    head = headline(run(21, unseen=(0, 19, 20)))
+    assert head["turns_s"] == pytest.approx([0.02, 0.36])
+    assert head["somersault_rev"] == pytest.approx(17 / 20) and np.isfinite(head["twist_rev_sd"])
+    assert any("are counted from 0.02 to 0.36 s" in warning for warning in body_warnings(json_ready(head)))
+    assert not any("counted" in warning for warning in body_warnings(json_ready(headline(run(21)))))
+    hidden = headline(run(21, unseen=range(1, 21)))
+    assert hidden["turns_s"] == pytest.approx([0, 0.4]) and np.isnan(hidden["somersault_rev_sd"])
+
+
 def test_only_lost_frames_between_poses_make_a_gap():
     assert headline(run(10, lost=(4,)))["has_gap"]
     assert not headline(run(10, lost=(0, 1, 9)))["has_gap"]

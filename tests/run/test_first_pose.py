@@ -10,7 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose, human18
 from airborne.cameras import Rig, write_pose2sim
 from airborne.cameras.skeletons import SKELETONS
-from airborne.errors import BodyError, CalibrationError, TrialError
+from airborne.errors import CalibrationError, MistakesError, TrialError
 from airborne.run import detections as trial_detections
 from airborne.run import first_pose
 from airborne.run.folder import input_hashes
@@ -173,7 +173,8 @@ def test_a_point_that_cannot_be_right_is_a_mistake_and_a_wrong_stature_a_doubt(t
     result = find_first_pose(trial(f"[start]\njoints_m = {{{written}}}\n"), MODEL, RIG)
     assert not result.mistakes and result.notes[0].endswith("; check the points and the body's size")
     assert result.wrong_size is not None and abs(result.wrong_size.value + 0.15) < 2 * result.wrong_size.sd
-    assert result.notes[1].startswith("start.joints_m: the landmarks of the start are those of a body 15 ± 3 % smaller")
+    assert "are those of a body 15 ± 3 % smaller" in result.wrong_size.sentence
+    assert result.doubts == result.notes[:1]
 
 
 def test_a_stature_that_is_right_is_not_doubted_by_landmarks_25_mm_off(trial):
@@ -320,8 +321,8 @@ def test_another_start_is_another_run(trial):
 
 
 def test_impossible_person_is_refused(trial):
-    with pytest.raises(BodyError):
-        trial(DETECTIONS, tables=detections(), body=BODY.replace("1.7", "17")).model()
+    with pytest.raises(MistakesError, match=r"stature_m is 17; expected 0\.8 to 2\.5 metres"):
+        trial(DETECTIONS, tables=detections(), body=BODY.replace("1.7", "17"))
 
 
 def test_the_man_on_the_beam(shared_data, tmp_path):

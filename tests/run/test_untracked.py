@@ -1,12 +1,15 @@
 """A run of a body of which no frame is tracked: the mix-up that would explain it is named, and nothing else is."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from airborne.body.shaping import with_size
 from airborne.cameras import Rig
-from airborne.run.mix_ups import MixUp, possible_mix_ups
+from airborne.run import untracked
+from airborne.run.mix_ups import MixUp, _silhouette, possible_mix_ups, undecided_mix_ups
 from airborne.run.untracked import explain_untracked
 from airborne.tracking.methods import Settings
 from tests.support.scenes import CAMERAS, CROSS, Scene
@@ -14,6 +17,12 @@ from tests.support.scenes import CAMERAS, CROSS, Scene
 SCENE = Scene(cameras=CAMERAS[:3])
 RIG = Rig(tuple(SCENE.cameras))
 NAMES = RIG.names
+
+
+@pytest.fixture(autouse=True)
+def nothing_stands_out(monkeypatch):
+    """At the start of these recordings, of which nothing else is read."""
+    monkeypatch.setattr(untracked, "start_foregrounds", lambda recording: nullcontext([None] * len(recording.rig)))
 
 
 @dataclass
@@ -41,7 +50,8 @@ def test_a_mix_up_is_named(mix_up):
 def test_of_a_wrong_start_it_is_said_what_was_tried():
     said = explained(None, SCENE.start().move([0.8, 0.5, 0.0], [0.0, 0.0, 2.0]))
     assert said.endswith(
-        "with videos exchanged or mirrored, nor with one camera left out: are [start] and the body's size right?"
+        "with videos exchanged or mirrored, nor with one camera left out, nor with another size of the body: are "
+        "[start] and the body right?"
     )
 
 
@@ -49,11 +59,35 @@ def test_a_camera_that_was_moved_is_named():
     class Moved(Played):
         def __iter__(self):
             for frames in super().__iter__():
-                views = [replace(view, image=np.roll(view.rgb, 40, axis=1)) for view in frames.views[1:2]]
+                views = [replace(view, image=np.roll(view.rgb, 25, axis=1)) for view in frames.views[1:2]]
                 yield replace(frames, views=(frames.views[0], *views, frames.views[2]))
 
     why = explain_untracked(Settings(), CROSS, SCENE.start(), Moved(None))
     assert why.sentence.startswith(f"without {NAMES[1]}, 5 of the first 5 frames are tracked") and not why.is_mix_up
+
+
+def test_a_body_that_is_too_large_is_named():
+    why = explain_untracked(Settings(), with_size(CROSS, 1.2), SCENE.start(), Played(None))
+    assert why.sentence.startswith("with a body 10% smaller") and not why.is_mix_up
+
+
+def test_of_frames_that_are_tracked_as_they_are_no_camera_is_named():
+    why = explain_untracked(Settings(), CROSS, SCENE.start(), Played(None))
+    assert why.sentence.startswith("5 of the first 5 frames are tracked when nothing but them") and not why.is_mix_up
+
+
+def test_cameras_of_which_either_may_be_left_out_are_named_together():
+    names, changes = ("a", "b", "c", "d"), [untracked._Change(CROSS, camera=name) for name in ("b", "d")]
+    why = untracked._explain(changes, names, "4 of the first 5 frames are tracked", has_tried_mix_ups=False)
+    assert why.sentence.startswith("without b or without d, 4 of the first 5 frames are tracked: was one of them moved")
+
+
+def test_mix_ups_that_what_stands_out_speaks_against_are_not_tried():
+    seen = [_silhouette(CROSS, SCENE.start(), camera) for camera in RIG]
+    assert undecided_mix_ups(RIG, seen, CROSS, SCENE.start()) == []
+    assert undecided_mix_ups(RIG, [None] * 3, CROSS, SCENE.start()) == possible_mix_ups(3)
+    exchanged = [seen[1], seen[0], seen[2]]
+    assert MixUp((0, 1)) in undecided_mix_ups(RIG, exchanged, CROSS, SCENE.start())
 
 
 def test_what_is_undone_twice_is_as_before():

@@ -50,6 +50,18 @@ def with_joint_widths(model: BodyModel, scales: Mapping[str, float]) -> BodyMode
     return BodyModel(model.name, segments, model.landmarks)
 
 
+def with_size(model: BodyModel, share: float) -> BodyModel:
+    """Return the body made larger in all directions by a factor, at constant density; BodyError where out of range."""
+    if not _RANGE[0] <= share <= _RANGE[1]:
+        raise BodyError(f"size is {share:g} times the body's; expected a factor, {_RANGE[0]:g} to {_RANGE[1]:g}")
+    factors = np.full(3, share)
+    segments = tuple(
+        _segment(replace(segment, joint_m=share * segment.joint_m), factors, factors) for segment in model.segments
+    )
+    landmarks = tuple(replace(mark, position_m=share * mark.position_m) for mark in model.landmarks)
+    return BodyModel(model.name, segments, landmarks)
+
+
 def with_mass(model: BodyModel, mass_kg: float) -> BodyModel:
     """Return the body with a total mass [kg], distributed as before; BodyError where a segment's is not known."""
     if not 0 < mass_kg < np.inf:
@@ -162,7 +174,7 @@ def _part(part: Part, shape: Array, position: Array) -> Part:
     rotation = part.segment_from_part.rotation
     moved = RigidTransform.from_components(part.segment_from_part.translation * position, rotation)
     if isinstance(part.shape, Box | Ellipsoid):
-        axes = np.abs(rotation.as_matrix())
+        axes = np.eye(3) if np.ptp(shape) == 0 else np.abs(rotation.as_matrix())
         if np.abs(axes - axes.round()).max() > _ALIGNED:
             raise BodyError(
                 f"part '{part.name}' is oblique in its segment, so that stretching would shear it; give it axes along "

@@ -18,7 +18,11 @@ MOST_SHARE, UNUSUAL_SHARE = 0.30, 0.15  # of a length's share of the stature: re
 MOST_OFF_M = 0.06  # RMS of a joint's distance from where it was seen; more is refused
 _SUSPECT_OFF_M = 2 * MOST_OFF_M  # of one joint in one frame: warned of
 _AVERAGE_M, _AVERAGE_KG, _STATURES = 1.80, 75.0, (0.6, 1.35)  # a person, and how much smaller or taller others are
-_WRONG_SCALE = 0.10  # all lengths together differ by this: the stature, or the world's scale
+# of a person's height from the stature's, chosen on two synthetic people: 5 % too small or tall a stature gives 0.05 to
+# 0.06, 10 % 0.09 to 0.12, the right one 0.01
+_WRONG_HEIGHT = 0.07
+_WIDTHS = ("shoulder", "shoulder width", "hip width")  # of an average person these go with the root of the mass
+_IN_POUNDS = (0.40, 0.52)  # chosen: shares of a mass about 1 / 2.2046
 _SURE_WEIGHT = 1.0  # of a landmark whose place is a joint's; others are seen near by only
 
 WhereToLook = Callable[[Sequence[str]], str]  # points -> which camera's clicks of them to check first, or ""
@@ -29,35 +33,43 @@ def person_of_shares(given: BodyModel) -> BodyModel:
     average = human18(_AVERAGE_M, _AVERAGE_KG)
     if [segment.name for segment in given.segments] != [segment.name for segment in average.segments]:
         return given
-    spans_m = [
-        np.ptp(body.with_pose(Pose(world_from_root=RigidTransform.identity())).landmarks[:, 2])
-        for body in (given, average)
-    ]
-    share = float(np.clip(spans_m[0] / spans_m[1], *_STATURES))
+    share = float(np.clip(height_ratio(given, average), *_STATURES))
     average_kg = share**3 * _AVERAGE_KG
     mass_kg = sum(segment.inertia.mass_kg for segment in given.segments if segment.inertia is not None) or average_kg
     return human18(share * _AVERAGE_M, float(np.clip(mass_kg, average_kg / 2, average_kg * 2)))
 
 
-def check_lengths(ratios: Mapping[str, float], points: Mapping[str, Sequence[str]], look: WhereToLook) -> list[str]:
+def check_lengths(
+    ratios: Mapping[str, float], points: Mapping[str, Sequence[str]], look: WhereToLook, height: float = 1.0
+) -> list[str]:
     """Check segments' lengths, as ratios to the stature's shares by stem; return warnings, a line each.
 
-    `points` are those that a length is measured by. Raises BodyError where a length is beyond MOST_SHARE.
+    `points` are those that a length is measured by; `height` is the person's, relative to the stature's. Raises
+    BodyError where a length is beyond MOST_SHARE.
     """
-    typical = float(np.median(list(ratios.values())))
     unusual = {stem: ratio for stem, ratio in ratios.items() if abs(ratio - 1) > UNUSUAL_SHARE}
     wrong = {stem: ratio for stem, ratio in unusual.items() if abs(ratio - 1) > MOST_SHARE}
-    if abs(typical - 1) > _WRONG_SCALE:
-        cause = f"all lengths are about {typical:.2f} of it: check the stature, and the calibration's scale and unit"
-    else:
-        named = list(dict.fromkeys(point for stem in (wrong or unusual) for point in points[stem]))
-        cause = f"check the clicks of {', '.join(named)}{look(named)}"
+    causes, left = [], list(wrong or unusual)
+    if abs(height - 1) > _WRONG_HEIGHT:
+        causes.append(
+            f"all of the person is about {height:.2f} times as tall as the stature says: check the stature, and the "
+            "calibration's scale and unit"
+        )
+        left = [stem for stem in left if abs(ratios[stem] / height - 1) > UNUSUAL_SHARE]
+    elif "shoulder width" in left and set(left) <= set(_WIDTHS):
+        share = ratios["shoulder width"] ** 2
+        pounds = ", as if it were given in pounds" if _IN_POUNDS[0] < share < _IN_POUNDS[1] else ""
+        causes.append(f"widths go with the mass, of which about {share:.2f} would fit{pounds}: check the mass")
+    if left:
+        named = list(dict.fromkeys(point for stem in left for point in points[stem]))
+        causes.append(f"{'then ' if causes else 'check '}the clicks of {', '.join(named)}{look(named)}")
+    cause = ", ".join(causes)
     if wrong:
         raise BodyError(
             f"{_list(wrong)} of the length that the stature gives; expected {1 - MOST_SHARE:.2f} to "
             f"{1 + MOST_SHARE:.2f}; {cause}"
         )
-    return [f"{_list(unusual)} of the length that the stature gives; {cause}"] if unusual else []
+    return [f"{_list(unusual)} of the length that the stature gives; {cause}"] if unusual else causes
 
 
 def check_joints(
@@ -96,6 +108,13 @@ def check_joints(
         f"check its click{look([stem_of(names[joint])])}"
         for row, joint in np.argwhere(known & (off_m > _SUSPECT_OFF_M))
     ]
+
+
+def height_ratio(model: BodyModel, reference: BodyModel) -> float:
+    """Return how tall a body stands, by its landmarks, relative to another."""
+    standing = Pose(world_from_root=RigidTransform.identity())
+    own, other = (np.ptp(body.with_pose(standing).landmarks[:, 2]) for body in (model, reference))
+    return float(own / other)
 
 
 def length_ratios(model: BodyModel, reference: BodyModel) -> dict[str, float]:

@@ -130,7 +130,7 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     the contact sheet, those in the folder are shown. Raises ResultError where a number of the headline is missing.
     """
     summary = json_ready(summary)
-    missing = sorted({"name", *headline(Motion.collect([]))} - set(summary))
+    missing = sorted({"name", *headline(Motion.collect([]))} - {"turns_s"} - set(summary))  # older runs lack it
     if missing:
         raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
     if "whole_run" in summary and "method" in summary:
@@ -165,7 +165,7 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "cannot be seen", "turns: in every frame some direction of the orientation is hidden"
     else:
         for turn in ("somersault", "twist"):
-            yield _turns(head[f"{turn}_rev"], head.get(f"{turn}_rev_sd")), f"{turn}, first to last pose"
+            yield _turns(head[f"{turn}_rev"], head.get(f"{turn}_rev_sd")), f"{turn}, first to last pose that shows it"
         low, high = head["tilt_range_deg"]
         yield UNKNOWN_TEXT if low is None else f"{round(low)}° to {round(high)}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
@@ -251,10 +251,15 @@ def _self_check_table(findings: Sequence[Mapping[str, Any]]) -> HtmlTable | None
 
 
 def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:
-    mean, sd = flight["angular_momentum_kg_m2_s"], flight["angular_momentum_spread_kg_m2_s"]
+    names = ("angular_momentum_kg_m2_s", "angular_momentum_sd_kg_m2_s", "angular_momentum_spread_kg_m2_s")
+    mean, sd, scatter = (flight.get(name, [None] * 3) for name in names)
     rows = [
-        (f"angular momentum about {axis} [kg m²/s]: mean, standard deviation over the frames", mean[k], sd[k])
-        for k, axis in enumerate("xyz")
+        (f"angular momentum about {axis} [kg m²/s]: mean over the frames, standard deviation of its error", *pair)
+        for axis, *pair in zip("xyz", mean, sd, strict=True)
+    ]
+    rows += [
+        (f"its scatter from frame to frame about {axis} [kg m²/s]", each, "")
+        for axis, each in zip("xyz", scatter, strict=True)
     ]
     rows.append(
         (

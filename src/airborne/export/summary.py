@@ -27,6 +27,9 @@ _REASONS = {
 }
 
 
+_MUCH_LATER = 0.02  # chosen: share of a run by which its turns begin later or end earlier, from which on it is said
+
+
 def headline(motion: Motion) -> dict[str, Any]:
     """Reduce a motion to its headline numbers; unknown ones are NaN or infinite.
 
@@ -36,8 +39,9 @@ def headline(motion: Motion) -> dict[str, Any]:
     - `median_position_sd_mm`, `median_rotation_sd_deg`: of each frame's root mean square over the three axes;
       infinite where most frames do not show some direction
     - `range_m`: largest minus smallest x, y, z; `tilt_range_deg`: smallest and largest
-    - `somersault_rev`, `twist_rev`: revolutions from the first to the last frame with a pose; `somersault_rev_sd`,
-      `twist_rev_sd`: of both ends together
+    - `somersault_rev`, `twist_rev`: revolutions from the first to the last frame with a pose whose angles have an sd;
+      of any poses where fewer than two have; `somersault_rev_sd`, `twist_rev_sd`: of both ends together
+    - `turns_s`: the times of these ends
     - `n_position_unobservable`, `n_rotation_unobservable`: frames with an infinite variance
     - `n_near_singular`: frames within 5 degrees of 90 degrees of tilt
     - `has_gap`: lost frames lie between frames with a pose, so that whole revolutions may be miscounted
@@ -47,6 +51,7 @@ def headline(motion: Motion) -> dict[str, Any]:
     angles = root_angles(motion)
     somersault, tilt, twist = angles.deg[has_pose].T
     somersault_sd, _, twist_sd = angles.sd_deg[has_pose].T
+    ends_of_turns = _known_ends(somersault_sd, twist_sd)
     position_sd, rotation_sd = motion.position_sd[has_pose], motion.rotation_sd[has_pose]
     ends = motion.time_s[[0, -1]] if len(motion) else np.full(2, np.nan)
     return {
@@ -62,11 +67,12 @@ def headline(motion: Motion) -> dict[str, Any]:
         "median_position_sd_mm": 1e3 * _median(_rms_over_axes(position_sd)),
         "median_rotation_sd_deg": math.degrees(_median(_rms_over_axes(rotation_sd))),
         "range_m": np.ptp(motion.position[has_pose], axis=0).tolist() if len(rows) else [math.nan] * 3,
-        "somersault_rev": _revolutions(somersault),
-        "somersault_rev_sd": _of_both_ends(somersault_sd),
+        "turns_s": motion.time_s[has_pose][ends_of_turns].tolist() if len(rows) else [math.nan] * 2,
+        "somersault_rev": _revolutions(somersault[ends_of_turns]),
+        "somersault_rev_sd": _of_both_ends(somersault_sd[ends_of_turns]),
         "tilt_range_deg": [float(tilt.min()), float(tilt.max())] if len(rows) else [math.nan] * 2,
-        "twist_rev": _revolutions(twist),
-        "twist_rev_sd": _of_both_ends(twist_sd),
+        "twist_rev": _revolutions(twist[ends_of_turns]),
+        "twist_rev_sd": _of_both_ends(twist_sd[ends_of_turns]),
         "n_position_unobservable": int(np.isinf(position_sd).any(axis=1).sum()),
         "n_rotation_unobservable": int(np.isinf(rotation_sd).any(axis=1).sum()),
         "n_near_singular": int(angles.is_singular[rows].sum()),
@@ -100,6 +106,13 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
             f"In {head['n_near_singular']} frames tilt is within 5° of ±90°: somersault and twist mean little there, "
             "and their numbers of turns may be miscounted. The quaternions are sound."
         )
+    if (turns_s := head.get("turns_s")) and turns_s[0] is not None:
+        late, early = turns_s[0] - head["start_s"], head["start_s"] + head["duration_s"] - turns_s[1]
+        if max(late, early) > _MUCH_LATER * head["duration_s"] and not head["n_lost"]:
+            yield (
+                f"Somersault and twist are counted from {turns_s[0]:.2f} to {turns_s[1]:.2f} s: at the ends of the run "
+                "the pictures do not show them."
+            )
     if head["has_gap"]:
         yield (
             "Somersault and twist were counted across lost frames, at the rate before them: they may be off by whole "
@@ -154,6 +167,13 @@ def _rms_over_axes(sd: Array) -> Array:
 def _median(values: Array) -> float:
     present = values[~np.isnan(values)]
     return float(np.median(present)) if len(present) else math.nan
+
+
+def _known_ends(*sd_deg: Array) -> list[int]:
+    """Return the first and last place at which all these are known; of all places where fewer than two are."""
+    known = np.flatnonzero(np.isfinite(sd_deg).all(axis=0))
+    places = known if len(known) > 1 else np.arange(len(sd_deg[0]))
+    return places[[0, -1]].tolist() if len(places) else []
 
 
 def _of_both_ends(sd_deg: Array) -> float:

@@ -24,12 +24,11 @@ from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
 from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
-from airborne.motion.flight.momentum_table import wrong_flight
 from airborne.motion.joints import doubtful_segments
 from airborne.motion.run_folder import BODY, MOTION, TRACKED_MOTION, figures_of, tables_of, videos_of
 from airborne.motion.tables import write_uncertainty
 from airborne.run.body_passes import BodyPasses
-from airborne.run.body_tables import write_tables
+from airborne.run.body_tables import missing_masses, write_tables
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose, out_of_sight
@@ -82,7 +81,8 @@ class BodyRun:
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
         keys, missed = keys_of_frames(trial, model, opened.recording)
         notes = [*model.notes, *([] if found is None else [found.note])]
-        opened.recording.events.extend([*notes, *first.notes, *first.mistakes, *missed])
+        notes += [note for note in first.notes if note not in first.doubts]
+        opened.recording.events.extend([*notes, *missed])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first)
 
     @property
@@ -242,8 +242,7 @@ class BodyRun:
         measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
-        of_fall = wrong_flight(motion, measured.flight)
-        findings = [*([of_fall.to_dict()] if of_fall else []), *checked.findings]
+        findings = [*([measured.wrong_fall.to_dict()] if measured.wrong_fall else []), *checked.findings]
         self.recording.events.extend([*checked.doubts, *far_keys(self.trial, model, motion, rig)])
         if not motion.count(Status.TRACKED) and len(motion) > 1 and not checked.is_start_wrong:
             args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
@@ -297,4 +296,5 @@ class BodyRun:
 
     def warnings(self) -> list[str]:
         """Return what a reader of the numbers must know beside the uncertainty."""
-        return []
+        doubts = [] if self.first is None else [*self.first.doubts, *self.first.mistakes]
+        return [*doubts, *self.trial.body.doubts(self.model), *missing_masses(self.model)]

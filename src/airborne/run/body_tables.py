@@ -16,8 +16,10 @@ from airborne.motion import (
     write_joints,
     write_motion_parquet,
 )
+from airborne.motion.flight.momentum_table import widen_momentum, wrong_flight
 from airborne.motion.joints import count_statuses
 from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, JOINTS, tables_of
+from airborne.tracking.self_check.free_flight import WrongFall
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +30,7 @@ class Measured(NamedTuple):
 
     joint_statuses: dict[str, dict[str, int]] | None  # of `count_statuses`; None of a body without joints
     flight: xr.Dataset | None  # of `measure_flight`; None without joints or masses
+    wrong_fall: WrongFall | None = None  # what the flight says against the calibration or the frame rate
 
 
 def write_tables(folder: Path, motion: Motion, model: BodyModel) -> Measured:
@@ -39,7 +42,23 @@ def write_tables(folder: Path, motion: Motion, model: BodyModel) -> Measured:
     if not motion.joints:
         return Measured(None, None)
     write_joint_angles(folder / JOINT_ANGLES, motion, model)
-    flight = measure_flight(motion, model) if has_inertias(model) else None
-    if flight is not None:
-        write_flight(folder / FLIGHT, motion, flight)
-    return Measured(count_statuses(status, model), flight)
+    statuses = count_statuses(status, model)
+    if not has_inertias(model):
+        return Measured(statuses, None)
+    flight = measure_flight(motion, model)
+    wrong = wrong_flight(motion, flight)
+    flight = widen_momentum(flight, wrong)
+    write_flight(folder / FLIGHT, motion, flight)
+    return Measured(statuses, flight, wrong)
+
+
+def missing_masses(model: BodyModel) -> list[str]:
+    """Return, as a sentence, that a body with joints lacks masses, and what is not measured for that."""
+    missing = [segment.name for segment in model.segments if segment.inertia is None]
+    if not model.has_joints or not missing:
+        return []
+    which = "its segments" if len(missing) == len(model.segments) else ", ".join(missing[:3])
+    return [
+        f"the body has no mass of {which}, so that there is no {Path(FLIGHT).name}: no centre of mass and no angular "
+        "momentum; give each segment a [segment.inertia], or fit the preset human18 by `airborne fit-body`"
+    ]

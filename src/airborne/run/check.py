@@ -123,10 +123,12 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
         for warning in cameras[1].warnings if cameras is not None and cameras[1] is not None else ():
             checks.add(f"note: {warning}")
     if not trial.has_players and _exists(trial, body.source_file):
-        checks.attempt(
+        model = checks.attempt(
             trial.model,
             lambda model: "; ".join([f"body: {model.name}, {count(len(model.segments), 'segment')}", *model.notes]),
         )
+        for note in () if model is None else body.doubts(model):
+            checks.add(f"note: {note}")
     if detections is not None and facts and _exists(trial, detections):
         checks.attempt(
             lambda: read_trial_detections(shown, tuple(facts.values())), lambda _: f"detections: {detections}"
@@ -172,7 +174,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         model = trial.model()
         found = checks.attempt(
             lambda: find_first_pose(trial, model, recording.rig, opened.detections),
-            lambda found: "; ".join([f"start: frame {trial.start.frame}", *found.notes]),
+            lambda found: "; ".join([f"start: frame {trial.start.frame}", *found.notes, *found.size_notes]),
         )
         if found is not None and trial.start.detections is None:  # a network's mistakes are not the user's
             checks.mistakes += [f"{trial.name}: {mistake}" for mistake in found.mistakes]

@@ -144,6 +144,27 @@ def possible_mix_ups(n_cameras: int) -> list[MixUp]:
     return [MixUp(cameras) for n in (2, 1) for cameras in combinations(range(n_cameras), n)]
 
 
+def undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyModel, start: Pose) -> list[MixUp]:
+    """Return the mix-ups that what stands out in the cameras at the start does not speak against.
+
+    It does where an image agrees with its own camera's silhouette, or better than as the mix-up would have it.
+    """
+    silhouettes = [_silhouette(model, start, camera) for camera in rig]
+    own = _agreements(foregrounds, silhouettes)
+
+    def is_possible(mix_up: MixUp) -> bool:
+        if mix_up.is_exchange:
+            images = [foregrounds[i] for i in reversed(mix_up.cameras)]
+        else:
+            images = [_mirror(foregrounds[i]) for i in mix_up.cameras]
+        crossed = _agreements(images, [silhouettes[i] for i in mix_up.cameras])
+        return all(
+            own[i] < _LEAST_AGREEMENT and own[i] <= other for i, other in zip(mix_up.cameras, crossed, strict=True)
+        )
+
+    return list(filter(is_possible, possible_mix_ups(len(rig))))
+
+
 def _compare(name: str, own: float, other: float, how: str) -> str:
     return f"the body at the start agrees with what moves in {name} to {max(own, 0):.0%}, to {other:.0%} {how}"
 

@@ -36,6 +36,9 @@ from airborne.video.containers import ADDRESS
 # a part was calibrated, and how much of it a video shows at least; one said to be twice as large as it is does not pass
 _BEYOND, _LEAST_SHARE = 0.5, 0.1
 
+_SHARES = (2, 3, 4)  # of images that are left out evenly: every second, two of three, three of four
+_FEWEST_IMAGES = 10  # chosen: of a video whose length says something
+
 AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)
 
 
@@ -82,11 +85,34 @@ def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opene
         stop=trial.track.stop,
         lazy=fields_as == "rows",
     )
-    recording.events.extend(cameras.notes)
+    recording.events.extend([*cameras.notes, *fewer_images(recording.rig.names, cameras.facts)])
     n, stop = recording.n_images, trial.track.stop
     if n is not None and stop is not None and stop > n:
         recording.events.append(f"track.stop = {stop} lies past the end: the last frame is {n - 1}")
     return Opened(recording, cameras.calibration, cameras.detections)
+
+
+def fewer_images(names: Sequence[str], facts: Sequence[VideoFacts]) -> list[str]:
+    """Return, as sentences, which videos are a half, third or fourth as long as most, as where images are left out."""
+    durations_s = [each.duration_s for each in facts if each.duration_s is not None]
+    if not durations_s:
+        return []
+    usual_s = sorted(durations_s)[len(durations_s) // 2]
+    notes = []
+    for name, each in zip(names, facts, strict=True):
+        if not each.duration_s or each.duration_s * each.frame_rate < _FEWEST_IMAGES:
+            continue
+        share = round(usual_s / each.duration_s)
+        if (
+            share in _SHARES and abs(share * each.duration_s - usual_s) <= share / each.frame_rate
+        ):  # to an image that is left out
+            stated, true = float(each.frame_rate), float(each.frame_rate / share)
+            notes.append(
+                f"{name}: its video lasts 1/{share} as long as most, {float(each.duration_s):.2f} s of "
+                f"{float(usual_s):.2f}, at its stated {stated:.5g} images/s: it ended earlier, or its images come at "
+                f"{true:.5g} a second, and all but its first are shown too early; write it anew with the rate it has"
+            )
+    return notes
 
 
 @contextmanager

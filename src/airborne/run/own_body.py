@@ -18,6 +18,7 @@ from airborne.body.sides import without_side
 from airborne.body_fitting.checks import (
     check_joints,
     check_lengths,
+    height_ratio,
     length_ratios,
     person_of_shares,
     points_of_lengths,
@@ -94,7 +95,7 @@ def fit_person(
     shares, points = model if trial.body.preset else person_of_shares(model), points_of_lengths(model)
     try:
         measured = with_segment_lengths(model, measure_lengths(model, [landmarks[index] for index in chosen]))
-        check_lengths(length_ratios(measured, shares), points, look)
+        check_lengths(length_ratios(measured, shares), points, look, height_ratio(measured, shares))
         observations = _read(recording, landmarks, sorted({*chosen, *around}), report)
         missing = [index for index in chosen if index not in observations]
         if missing:
@@ -109,7 +110,8 @@ def fit_person(
         )
         seen = [observations[index].landmarks for index in chosen]
         warnings = check_joints(fit.model, fit.poses, seen, weights=LANDMARK_WEIGHTS, frames=chosen, look=look)
-        warnings += check_lengths(length_ratios(fit.model, shares), points, look)
+        warnings += check_lengths(length_ratios(fit.model, shares), points, look, height_ratio(fit.model, shares))
+        warnings += trial.body.doubts(fit.model)
     except BodyError as error:
         raise BodyError("; ".join([f"{trial.name}: {error}", *recording.events])) from error
     picture = output.with_name(PICTURE)

@@ -6,7 +6,9 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from airborne.body import BodyModel
 from airborne.body.anthropometry import require_athlete
+from airborne.body.density import doubt_build, doubt_mass
 from airborne.errors import BodyError
 from airborne.io.names import CheckedPath
 from airborne.trial.table import SettingsTable
@@ -39,6 +41,12 @@ class BodyTable(SettingsTable):
             except BodyError as error:
                 raise ValueError(str(error)) from None
         return self
+
+    def doubts(self, model: BodyModel) -> list[str]:
+        """Return what is odd about the mass of its body, or of what has been fitted from it: sentences."""
+        if self.stature_m is None or self.mass_kg is None:
+            return [*doubt_mass(model)]
+        return [*doubt_build(self.stature_m, self.mass_kg), *doubt_mass(model)]
 
     @property
     def source_file(self) -> str | None:

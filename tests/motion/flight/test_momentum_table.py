@@ -12,9 +12,10 @@ from airborne.body import Pose
 from airborne.errors import BodyError, ResultError
 from airborne.motion import flight_summary, has_inertias, measure_flight, write_flight
 from airborne.motion.flight.momentum import centre_of_mass
-from airborne.motion.flight.momentum_table import _fit_parabola
+from airborne.motion.flight.momentum_table import _fit_parabola, widen_momentum
+from airborne.tracking.self_check.free_flight import WrongFall
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
-from tests.support.tolerances import EXACT, ROUNDTRIP, sampled
+from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
 
 MODEL = figure()
 TIMES = np.arange(21) / 50
@@ -60,6 +61,22 @@ def test_summary_of_a_free_fall_finds_gravity_rotations_and_a_constant_momentum(
     # a stiff body about a fixed axis: momentum turns with the body only across the axis, along it it stays
     assert summary.angular_momentum_spread_kg_m2_s[0] < 1e-6 * summary.angular_momentum_kg_m2_s[0]
     assert summary.to_dict()["fitted_gravity_m_s2"] == summary.fitted_gravity_m_s2
+
+
+def test_a_summary_states_the_error_of_the_momentum_beside_its_scatter():
+    motion = motion_of(MODEL, falling(), covariance=small_covariance(MODEL))
+    table = measure_flight(motion, MODEL)
+    summary = flight_summary(motion, table)
+    np.testing.assert_allclose(summary.angular_momentum_sd_kg_m2_s, np.median(table["angular_momentum_sd"], axis=0))
+    assert summary.angular_momentum_sd_kg_m2_s[0] > 10 * summary.angular_momentum_spread_kg_m2_s[0]
+
+
+def test_a_wrong_fall_widens_the_momentum_by_its_share_of_gravity():
+    table = measure_flight(motion_of(MODEL, falling(), covariance=small_covariance(MODEL)), MODEL)
+    wide = widen_momentum(table, WrongFall(0.7 * 9.81, 0.04, ""))
+    momentum, sd = table["angular_momentum"], table["angular_momentum_sd"]
+    np.testing.assert_allclose(wide["angular_momentum_sd"] ** 2, sd**2 + (0.3 * momentum) ** 2, rtol=SOLVED)
+    assert wide["angular_momentum_sd"].attrs == sd.attrs and widen_momentum(table, None) is table
 
 
 def test_places_that_no_view_shows_leave_the_fall_of_the_others_as_it_is():

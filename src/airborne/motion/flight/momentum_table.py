@@ -40,6 +40,7 @@ class FlightSummary:
     twist_rev: float
     tilt_range_deg: tuple[float, float]
     angular_momentum_kg_m2_s: Triple  # mean over the frames, world axes, about the centre of mass
+    angular_momentum_sd_kg_m2_s: Triple  # stated standard deviation of a frame, median; errors of masses last all run
     angular_momentum_spread_kg_m2_s: Triple  # standard deviation over the frames
     fitted_gravity_m_s2: float  # downward acceleration of the best-fitting parabola of the centre of mass
     fitted_gravity_sd_m_s2: float  # by the distances from it, each of which depends on the one before
@@ -116,8 +117,9 @@ def centres_of_mass(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
 def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
     """Reduce a flight, as `measure_flight` gives it, to its headline numbers."""
     rows = np.flatnonzero(motion.has_pose)
-    momentum = table["angular_momentum"].to_numpy()
-    momentum = momentum[np.isfinite(momentum).all(axis=-1)]
+    momentum, sd = (table[name].to_numpy() for name in ("angular_momentum", "angular_momentum_sd"))
+    is_known = np.isfinite(momentum).all(axis=-1)
+    momentum, sd = momentum[is_known], sd[is_known & np.isfinite(sd).all(axis=-1)]
     gravity, gravity_sd, rms = _fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows], motion.R[rows])
     tilt = table["tilt"].to_numpy()[rows]
     return FlightSummary(
@@ -126,6 +128,7 @@ def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
         twist_rev=_change(table["twist"].to_numpy()[rows]),
         tilt_range_deg=(float(tilt.min()), float(tilt.max())) if len(rows) else (np.nan, np.nan),
         angular_momentum_kg_m2_s=_triple(momentum.mean(axis=0) if len(momentum) else np.full(3, np.nan)),
+        angular_momentum_sd_kg_m2_s=_triple(np.median(sd, axis=0) if len(sd) else np.full(3, np.nan)),
         angular_momentum_spread_kg_m2_s=_triple(
             momentum.std(axis=0, ddof=1) if len(momentum) > 1 else np.full(3, np.nan)
         ),
@@ -133,6 +136,20 @@ def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
         fitted_gravity_sd_m_s2=gravity_sd,
         ballistic_rms_mm=1e3 * rms,
     )
+
+
+def widen_momentum(table: xr.Dataset, wrong: WrongFall | None) -> xr.Dataset:
+    """Return a flight with the sds of its angular momentum widened by a wrong fall; without one, as it is.
+
+    The momentum goes with the frame rate, of which the fall's gravity tells the square root, and with the square of
+    lengths: the gravity's own share lies between these, and counts as one standard deviation.
+    """
+    if wrong is None:
+        return table
+    share = abs(wrong.gravity_m_s2 / GRAVITY_M_S2 - 1)
+    stated = table["angular_momentum_sd"]
+    sd = (stated**2 + (share * table["angular_momentum"]) ** 2) ** 0.5
+    return table.assign(angular_momentum_sd=sd.assign_attrs(stated.attrs))
 
 
 def wrong_flight(motion: Motion, table: xr.Dataset | None) -> WrongFall | None:

@@ -39,10 +39,16 @@ class FirstPose:
 
     pose: Pose
     notes: tuple[str, ...] = ()  # what the user should know, one line each
+    doubts: tuple[str, ...] = ()  # those of the notes that say what may be wrong
     mistakes: tuple[str, ...] = ()  # points that cannot be right
     points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], those that were given
     wrong_size: WrongSize | None = None  # of the body, by the points
     exchange: str = ""  # what says that left and right of the whole body are exchanged
+
+    @property
+    def size_notes(self) -> tuple[str, ...]:
+        """What says that the body is larger or smaller than the points, which the self-check of a run says too."""
+        return () if self.wrong_size is None else (self.wrong_size.sentence,)
 
 
 def pose_by_hand(
@@ -119,11 +125,11 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
         f"the largest is {worst} with {off_m[worst] * 1e3:.0f} mm{doubt}",
         f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
         f"{where}: {fit.note}" if fit.note else "",
-        f"{where}: {wrong_size.sentence}" if wrong_size else "",
     ]
     exchange = f"{where}: {fit.note}" if fit.note and fit.is_exchanged else ""
+    doubts = [note for note, is_doubt in zip(notes, (doubt, "", fit.note), strict=True) if is_doubt]
     said = tuple(note for note in notes if note)
-    return FirstPose(fit.pose, said, tuple(mistakes), given, wrong_size, exchange)
+    return FirstPose(fit.pose, said, tuple(doubts), tuple(mistakes), given, wrong_size, exchange)
 
 
 def check_landmark_names(model: BodyModel, where: str, names: Sequence[str]) -> None:
