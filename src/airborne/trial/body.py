@@ -37,9 +37,9 @@ class BodyTable(SettingsTable):
 
     def doubts(self, model: BodyModel) -> list[str]:
         """Return what is odd about the mass of its body, or of what has been fitted from it: sentences."""
-        is_stated = self.stature_m is not None and self.mass_kg is not None
-        of_build = doubt_build(self.stature_m, self.mass_kg) if is_stated else ()
-        return [*of_build, *doubt_mass(model)]
+        if self.stature_m is None or self.mass_kg is None:
+            return list(doubt_mass(model))
+        return [*doubt_build(self.stature_m, self.mass_kg), *doubt_mass(model)]
 
     @property
     def source_file(self) -> str | None:
