@@ -100,6 +100,9 @@ def test_widths_alone_that_are_off_question_the_mass():
         BodyError, match=r"of which about 0\.45 would fit, as if it were given in pounds: check the mass"
     ):
         check_body(human18(1.7, 65.0), human18(1.7, 65.0 * 2.2046))
+    ratios = {"shoulder": 0.69, "shoulder width": 0.71, "upper_arm": 0.82}  # the one that is refused is a width
+    with pytest.raises(BodyError, match=r"^shoulder 0\.69 of .* of which about 0\.50 would fit"):
+        check_lengths(ratios, POINTS, in_cam2)
 
 
 def test_a_body_is_compared_with_the_person_of_its_own_height():

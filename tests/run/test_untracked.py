@@ -51,7 +51,7 @@ def test_of_a_wrong_start_it_is_said_what_was_tried():
     said = explained(None, SCENE.start().move([0.8, 0.5, 0.0], [0.0, 0.0, 2.0]))
     assert said.endswith(
         "with videos exchanged or mirrored, nor with one camera left out, nor with another size of the body: are "
-        "[start] and the body right?"
+        "[start], the body and the calibration right?"
     )
 
 

@@ -56,7 +56,7 @@ def check_lengths(
             "calibration's scale and unit"
         )
         left = [stem for stem in left if abs(ratios[stem] / height - 1) > UNUSUAL_SHARE]
-    elif "shoulder width" in left and set(left) <= set(_WIDTHS):
+    elif "shoulder width" in unusual and set(left) <= set(_WIDTHS):
         share = ratios["shoulder width"] ** 2
         pounds = ", as if it were given in pounds" if _IN_POUNDS[0] < share < _IN_POUNDS[1] else ""
         causes.append(f"widths go with the mass, of which about {share:.2f} would fit{pounds}: check the mass")

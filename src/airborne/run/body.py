@@ -38,6 +38,7 @@ from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.run.untracked import explain_untracked
 from airborne.run.whole_run import FittedRun, fit_whole_run
+from airborne.run.wrong_colours import wrong_colours
 from airborne.tracking import Estimate, Status
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose import FirstPose
@@ -205,10 +206,8 @@ class BodyRun:
         if doubtful is None and self.model.has_joints:
             (doubtful,) = doubtful_segments(Motion.collect([estimate], self.names[1:]), self.model)
         for artist in artists:
-            if isinstance(artist, OverlayVideos):
-                artist.write(frames, posed, estimate.status, doubtful)
-            else:
-                artist.write(frames, posed, estimate.status)
+            more = (doubtful,) if isinstance(artist, OverlayVideos) else ()
+            artist.write(frames, posed, estimate.status, *more)
 
     def keep(self, frames: Frames) -> None:
         """Keep some frames, spread over the run, for the self-check."""
@@ -243,7 +242,8 @@ class BodyRun:
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
         findings = [*([measured.wrong_fall.to_dict()] if measured.wrong_fall else []), *checked.findings]
-        self.recording.events.extend([*checked.doubts, *far_keys(self.trial, model, motion, rig)])
+        of_colours = wrong_colours(model, motion, self.kept)
+        self.recording.events.extend([*checked.doubts, *of_colours, *far_keys(self.trial, model, motion, rig)])
         if not motion.count(Status.TRACKED) and len(motion) > 1 and not checked.is_start_wrong:
             args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
             self.recording.events.append((why := explain_untracked(*args)).sentence)

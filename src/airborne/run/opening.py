@@ -100,12 +100,10 @@ def fewer_images(names: Sequence[str], facts: Sequence[VideoFacts]) -> list[str]
     usual_s = sorted(durations_s)[len(durations_s) // 2]
     notes = []
     for name, each in zip(names, facts, strict=True):
-        if not each.duration_s or each.duration_s * each.frame_rate < _FEWEST_IMAGES:
+        if each.duration_s is None or each.duration_s * each.frame_rate < _FEWEST_IMAGES:
             continue
         share = round(usual_s / each.duration_s)
-        if (
-            share in _SHARES and abs(share * each.duration_s - usual_s) <= share / each.frame_rate
-        ):  # to an image that is left out
+        if share in _SHARES and abs(share * each.duration_s - usual_s) <= share / each.frame_rate:  # to an image
             stated, true = float(each.frame_rate), float(each.frame_rate / share)
             notes.append(
                 f"{name}: its video lasts 1/{share} as long as most, {float(each.duration_s):.2f} s of "

@@ -113,7 +113,7 @@ def fit_person(
         warnings += check_lengths(length_ratios(fit.model, shares), points, look, height_ratio(fit.model, shares))
         warnings += trial.body.doubts(fit.model)
     except BodyError as error:
-        raise BodyError("; ".join([f"{trial.name}: {error}", *recording.events])) from error
+        raise BodyError("; ".join([f"{trial.name}: {error}", *trial.body.doubts(model), *recording.events])) from error
     picture = output.with_name(PICTURE)
     write_body(output, fit.model)
     picture.write_bytes(_contact_sheet(fit, [observations[index].frames for index in chosen]))

@@ -109,7 +109,9 @@ def _explain(best: list[_Change], names: tuple[str, ...], how_many: str, *, has_
     tried = ["with videos exchanged or mirrored"] * has_tried_mix_ups
     tried += ["with one camera left out"] * (len(names) > _FEWEST_CAMERAS) + ["with another size of the body"]
     return Explanation(
-        f"the first frames are not tracked either {', nor '.join(tried)}: are [start] and the body right?", False
+        f"the first frames are not tracked either {', nor '.join(tried)}: are [start], the body and the "
+        "calibration right?",
+        False,
     )
 
 

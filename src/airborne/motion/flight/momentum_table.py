@@ -147,9 +147,8 @@ def widen_momentum(table: xr.Dataset, wrong: WrongFall | None) -> xr.Dataset:
     if wrong is None:
         return table
     share = abs(wrong.gravity_m_s2 / GRAVITY_M_S2 - 1)
-    stated = table["angular_momentum_sd"]
-    sd = (stated**2 + (share * table["angular_momentum"]) ** 2) ** 0.5
-    return table.assign(angular_momentum_sd=sd.assign_attrs(stated.attrs))
+    momentum, sd = table["angular_momentum"].to_numpy(), table["angular_momentum_sd"]
+    return table.assign(angular_momentum_sd=(sd.dims, np.hypot(sd.to_numpy(), share * np.abs(momentum)), sd.attrs))
 
 
 def wrong_flight(motion: Motion, table: xr.Dataset | None) -> WrongFall | None:
