@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from scipy.optimize import minimize_scalar
 
 from airborne.body import BodyModel
-from airborne.body.inverse_kinematics import fit_pose
+from airborne.body.inverse_kinematics import PoseFit, fit_pose
 from airborne.types import Array
 
 # chosen on 12 synthetic people, segments 5 % and joints 15 mm off, two such errors: with right statures landmarks were
@@ -41,18 +41,18 @@ class WrongSize(NamedTuple):
 
 
 def find_wrong_size(
-    model: BodyModel, targets: Mapping[str, Array], weights: Mapping[str, float], rms_m: float
+    model: BodyModel, targets: Mapping[str, Array], weights: Mapping[str, float], fit: PoseFit
 ) -> WrongSize | None:
     """Find by how much a person should be larger for its landmarks to lie at targets (3,) [m]; None where it is right.
 
-    rms_m: how far its own landmarks are from them in the pose that fits best.
+    `fit` is the pose that fits best as it is.
     """
-    if not model.has_joints or rms_m < _SUSPECT_RMS_M:
+    if not model.has_joints or fit.rms_m < _SUSPECT_RMS_M:
         return None
 
     def cost_m2(size: float) -> float:  # the targets are scaled, not the body
         scaled = {name: target / size for name, target in targets.items()}
-        return (size * fit_pose(model, scaled, weights=weights, seeks_swap=False).rms_m) ** 2
+        return (size * fit_pose(model, scaled, weights=weights, start=fit.pose, seeks_swap=False).rms_m) ** 2
 
     found = minimize_scalar(cost_m2, bounds=(_LEAST, _MOST), method="bounded", options={"xatol": _STEP})
     value = float(found.x) - 1

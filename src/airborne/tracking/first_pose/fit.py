@@ -113,7 +113,7 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     worst = max(off_m, key=off_m.__getitem__)
     missing = ", ".join(name for name, point in targets.items() if np.isnan(point).any())
     given = {name: point for name, point in targets.items() if np.isfinite(point).all()}
-    wrong_size = None if fit.is_exchanged else find_wrong_size(model, given, LANDMARK_WEIGHTS, fit.rms_m)
+    wrong_size = None if fit.is_exchanged else find_wrong_size(model, given, LANDMARK_WEIGHTS, fit)
     doubt = "; check the points and the body's size" if fit.rms_m > _DOUBTFUL_RMS_M else ""
     mistakes = [
         f"{where}: {name} lies {distance:.1f} m from where the body can have it; correct it, or the body's size"
