@@ -89,12 +89,10 @@ class CameraCheck:
         One that is late shows the players elsewhere too, where they move.
         """
         clear = [each.describe(names, self._n_times) for view, each in self._shifted.items() if view is not None]
+        unclear = [self._shifted[None].describe(names, self._n_times)] if None in self._shifted else []
         if hidden := self._describe_shown(names):
-            return clear or hidden
-        times = self._describe_times(names)
-        if times or clear or None not in self._shifted:
-            return times or clear
-        return [self._shifted[None].describe(names, self._n_times)]
+            return clear or [*hidden, *unclear]
+        return self._describe_times(names) or clear or unclear
 
     def _describe_shown(self, names: Sequence[str]) -> list[str]:
         shares = {names[i]: self._n_shown[i] / n for i, n in sorted(self._n_found.items())}
