@@ -8,6 +8,7 @@ import numpy as np
 
 from airborne.body.human import PARENTS
 from airborne.body.model import BodyModel, Ellipsoid, Part
+from airborne.body.shaping import total_mass_kg
 
 # body mass index [kg/m2]; beyond is starvation, and the third class of obesity (WHO, Technical Report 894, 2000)
 _BUILDS = (14.0, 40.0)
@@ -36,7 +37,7 @@ def doubt_mass(model: BodyModel) -> Iterator[str]:
     if density is None or _DENSITIES[0] <= density <= _DENSITIES[1]:
         return
     low, high = _DENSITIES
-    mass_kg = _mass_kg(model)
+    mass_kg = total_mass_kg(model)
     much = "large" if density > high else "small"
     yield (
         f"body: {mass_kg:.1f} kg are {density:.2f} kg a litre of its ellipsoids; expected {low:.2f} to {high:.2f}: the "
@@ -54,11 +55,7 @@ def density_kg_per_l(model: BodyModel) -> float | None:
     if not is_person or any(segment.inertia is None for segment in model.segments):
         return None
     volume_m3 = sum(_volume_m3(part) for part in model.parts)
-    return _mass_kg(model) / (1000 * volume_m3) if volume_m3 > 0 else None
-
-
-def _mass_kg(model: BodyModel) -> float:
-    return sum(segment.inertia.mass_kg for segment in model.segments if segment.inertia is not None)
+    return total_mass_kg(model) / (1000 * volume_m3) if volume_m3 > 0 else None
 
 
 def _volume_m3(part: Part) -> float:

@@ -62,6 +62,11 @@ def with_size(model: BodyModel, share: float) -> BodyModel:
     return BodyModel(model.name, segments, landmarks)
 
 
+def total_mass_kg(model: BodyModel) -> float:
+    """Return the mass of the segments whose masses are known [kg]."""
+    return sum(segment.inertia.mass_kg for segment in model.segments if segment.inertia is not None)
+
+
 def with_mass(model: BodyModel, mass_kg: float) -> BodyModel:
     """Return the body with a total mass [kg], distributed as before; BodyError where a segment's is not known."""
     if not 0 < mass_kg < np.inf:
@@ -69,7 +74,7 @@ def with_mass(model: BodyModel, mass_kg: float) -> BodyModel:
     unknown = [segment.name for segment in model.segments if segment.inertia is None]
     if unknown:
         raise BodyError(f"body '{model.name}' has no inertia of {', '.join(unknown)}; give one, or no mass")
-    scale = mass_kg / sum(segment.inertia.mass_kg for segment in model.segments if segment.inertia is not None)
+    scale = mass_kg / total_mass_kg(model)
     segments = tuple(
         replace(segment, inertia=Inertia(own.mass_kg * scale, own.centre_m, own.tensor_kg_m2 * scale))
         for segment in model.segments

@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.body import BodyModel, Pose, human18
 from airborne.body.inverse_kinematics import CORE
-from airborne.body.shaping import length_axis
+from airborne.body.shaping import length_axis, total_mass_kg
 from airborne.body_fitting.clothes import stem_of
 from airborne.errors import BodyError
 from airborne.types import Array
@@ -35,7 +35,7 @@ def person_of_shares(given: BodyModel) -> BodyModel:
         return given
     share = float(np.clip(height_ratio(given, average), *_STATURES))
     average_kg = share**3 * _AVERAGE_KG
-    mass_kg = sum(segment.inertia.mass_kg for segment in given.segments if segment.inertia is not None) or average_kg
+    mass_kg = total_mass_kg(given) or average_kg
     return human18(share * _AVERAGE_M, float(np.clip(mass_kg, average_kg / 2, average_kg * 2)))
 
 

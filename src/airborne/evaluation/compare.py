@@ -24,8 +24,8 @@ _HARDLY_ANY = 0.2  # share within two sds; 0.95 is expected
 _OTHER_WAY = 10.0  # times nearer once turned to what looks the same: no noise does that
 _FAR_MM = 20_000.0  # beyond any error of a body in a hall
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
-_FARTHEST_SHIFT = 3  # periods by which the clocks are shifted relative to each other
-_MOST_FRAMES = 0.9  # shifts that leave fewer of the frames are ignored
+_FARTHEST_SHIFT = 3  # chosen: periods by which the clocks are shifted relative to each other
+_MOST_FRAMES = 0.9  # chosen: shifts that leave fewer of the frames are ignored
 _CLEARLY_BETTER = 0.5  # chosen: of the unshifted distance; a constant error along the motion looks like a shift
 _FEW_TIMES = 3  # chosen: matches at least that speak for milliseconds, and more than twice those in seconds
 

@@ -36,7 +36,7 @@ from airborne.video.containers import ADDRESS
 # a part was calibrated, and how much of it a video shows at least; one said to be twice as large as it is does not pass
 _BEYOND, _LEAST_SHARE = 0.5, 0.1
 
-_SHARES = (2, 3, 4)  # of images that are left out evenly: every second, two of three, three of four
+_SHARES = (2, 3, 4)  # chosen: of images that are left out evenly: every second, two of three, three of four
 _FEWEST_IMAGES = 10  # chosen: of a video whose length says something
 
 AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)

@@ -15,7 +15,7 @@ from airborne.types import Array
 from airborne.video import Frames
 
 _N_FRAMES = 4  # chosen: of those that a run keeps
-_FEWEST_PX = 20  # of a part, that say its colour
+_FEWEST_PX = 20  # chosen: of a part, that say its colour
 # RMS of sRGB values over the body, chosen: of four synthetic people in a hall, darker than their files say, 15 to 21;
 # with their colours in another order or inverted 67 to 99
 _MOST_OFF = 35.0

@@ -107,10 +107,10 @@ def _sample_all(
 
 
 def _compare_numbers(study: Study, variable: str) -> VariableComparison:
-    trials = [trial for trial in study.trials if trial.measured(variable) is not None]
+    trials = [trial for trial in study.trials if trial.require_number(variable) is not None]
     left_out = [f"{trial.name}: no {variable}" for trial in study.trials if trial not in trials]
     values = np.array([[trial.number(variable)] for trial in trials], float)
-    sd = np.array([[trial.measured(f"{variable}_sd") or 0.0] for trial in trials])
+    sd = np.array([[trial.require_number(f"{variable}_sd") or 0.0] for trial in trials])
     return _compare(study, trials, variable, values, sd**2, axis=None, axis_label="", left_out=left_out)
 
 

@@ -104,7 +104,7 @@ def event_times(trial: StudyTrial, curve: RunCurve, events: Sequence[str]) -> li
         if name in ("start", "end"):
             time_s = float(curve.time_s[0 if name == "start" else -1])
         elif name in _OF_THE_ROW:
-            stated = trial.measured(_OF_THE_ROW[name])
+            stated = trial.require_number(_OF_THE_ROW[name])
             time_s = np.nan if stated is None else stated
         else:
             time_s = _turn_s(trial, int(name.removeprefix("turn-")), times[0] if times else float(curve.time_s[0]))

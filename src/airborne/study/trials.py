@@ -36,7 +36,7 @@ class StudyTrial:
             return None
         return value if abs(value) < LARGEST else None
 
-    def measured(self, name: str) -> float | None:
+    def require_number(self, name: str) -> float | None:
         """Return a number of the row; None where the cell is empty; raises ResultError for anything else."""
         value = self.number(name)
         cell = self.row.get(name, "")

@@ -20,8 +20,8 @@ from airborne.video import Frames
 
 # chosen on synthetic blocks 9001 to 9032: errors of the capsules' outlines, which stay for a stride, are so long alike
 _CORRELATED_S = 1 / 6
-_WEAK_SD = 0.3  # [m, rad, shares], chosen: of a prior that keeps what no camera shows where it is
-_PRIOR = np.eye(N_FREE) / _WEAK_SD**2
+WEAK_SD = 0.3  # [m, rad, shares], chosen: of a prior that keeps what no camera shows where it is
+_PRIOR = np.eye(N_FREE) / WEAK_SD**2
 _PRIOR[:N_DOF, :N_DOF] += POSTURE_INFORMATION
 
 

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from airborne.tracking.capsules.bystanders import occluding_capsules
+from airborne.tracking.capsules.camera_evidence import WEAK_SD
 from airborne.tracking.capsules.dynamics import N_FREE
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, classes_with, pose_state
 from airborne.tracking.capsules.first_frame import points_of
@@ -36,7 +37,6 @@ _FARTHEST_M, _LEAST_M = 0.5, 0.075  # chosen: of a shift, across at the players;
 # team-mates, and mostly lost 30 to 65; of cameras shifted by 8 to 30 pixels, 0.08 to 0.3 m, most gained 35 to 150
 _LEAST_GAIN = 45.0
 _CLEARLY = 100.0  # chosen on the same: nats by which another camera explains less, where none was accused wrongly
-_WEAK_SD = 0.3  # chosen [m, rad, shares]: of the state about that of all cameras
 _WORSE = 0.75  # chosen: share of a player's usual evidence, below which cameras are looked at
 _MOVED_M = 0.05  # chosen: of the hips from frame to frame, 3 m/s at 60 Hz
 _MOST_STEPS = 12  # chosen: of a fit without a camera
@@ -117,7 +117,7 @@ def _leave_each_out(track: Track, tracks: Sequence[Track], frames: Frames, trust
     unoccluded = np.full(len(SURFACE_CLASSES), UNOCCLUDED)
     maps = map_evidence(regions, [track.colours.table(each.view, unoccluded) for each in regions], track.scale)
     others = occluding_capsules(track.state, [each.state for each in tracks if each is not track])
-    sd = np.full(N_FREE, _WEAK_SD)
+    sd = np.full(N_FREE, WEAK_SD)
     if trusted is not None:
         sd[:3] = _MOVED_M
     prior = JumperPrior((trusted or track).state[:N_FREE], np.diag(1 / sd**2))
@@ -172,7 +172,7 @@ def _suspect(players: Sequence[_Fits], *, is_known: bool) -> CameraShift | None:
 def _gain_alone(view: int, players: Sequence[_Fits]) -> float:
     """Return how much better than as tracked all players are explained without a camera that shows none of them."""
     own = [(fits, each) for fits in players for each in fits.left_out if each.view == view]
-    return sum(_unshifted(each) - fits.total for fits, each in own)
+    return sum(_total_as_calibrated(each) - fits.total for fits, each in own)
 
 
 def _gain_of(view: int, players: Sequence[_Fits]) -> tuple[float, CameraShift]:
@@ -185,14 +185,14 @@ def _gain_of(view: int, players: Sequence[_Fits]) -> tuple[float, CameraShift]:
         own = next((each for each in fits.left_out if each.view == view), None)
         if own is not None:
             at = np.round(steps * step_px / own.step_px).astype(int) + len(own.evidence) // 2
-            gain += own.total + own.evidence[np.ix_(at, at)] - max(map(_unshifted, fits.left_out))
+            gain += own.total + own.evidence[np.ix_(at, at)] - max(map(_total_as_calibrated, fits.left_out))
             least = max(least, _LEAST_M / _FARTHEST_M * (len(own.evidence) // 2) * own.step_px)
     gain[np.hypot(*np.meshgrid(steps, steps)) * step_px < least] = -np.inf
     down, right = np.unravel_index(gain.argmax(), gain.shape)
     return float(gain.max()), CameraShift(view, float(steps[right] * step_px), float(steps[down] * step_px), None)
 
 
-def _unshifted(fit: _LeftOut) -> float:
+def _total_as_calibrated(fit: _LeftOut) -> float:
     """Return what a fit says if its camera is right, or shows nothing of the player."""
     centre = len(fit.evidence) // 2
     return fit.total + max(float(fit.evidence[centre, centre]), 0.0)

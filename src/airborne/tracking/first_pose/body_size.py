@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from airborne.body import BodyModel
 from airborne.body.inverse_kinematics import PoseFit, fit_pose
+from airborne.tracking.self_check.path import alarm
 from airborne.types import Array
 
 # chosen on 12 synthetic people, segments 5 % and joints 15 mm off, two such errors: with right statures landmarks were
@@ -36,8 +37,7 @@ class WrongSize(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `self_check` in summary.json holds: an alarm."""
-        of = {"subject": "body", "kind": "scale", "value": self.value, "sd": self.sd}
-        return {**of, "is_alarm": True, "sentence": self.sentence}
+        return alarm("body", "scale", value=self.value, sd=self.sd, sentence=self.sentence)
 
 
 def find_wrong_size(

@@ -16,7 +16,7 @@ from airborne.types import Array
 
 
 def alarm(subject: str, kind: str, *, value: float, sd: float, sentence: str) -> dict[str, Any]:
-    """Return what `self_check` in summary.json holds of something wrong that a path shows."""
+    """Return what `self_check` in summary.json holds of something wrong that no cause of the check explains."""
     return {"subject": subject, "kind": kind, "value": value, "sd": sd, "is_alarm": True, "sentence": sentence}
 
 
