@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from airborne.constants import ALARM_SDS
 from airborne.geometry.even_sample import EvenSample
 from airborne.tracking import Status
 from airborne.tracking.camera_lags import solve_lags
@@ -18,7 +19,6 @@ from airborne.video import Frames
 
 _MOST_MOMENTS, _FEWEST_TIMES = 100, 20  # chosen: of a player that are kept; of all that say something
 _EVERY = 2  # chosen, frames apart: neighbours err alike, and a moment costs a tenth of a frame's tracking
-_ALARM_SDS = 3.0  # chosen: as of a body, one in 370 right cameras is accused
 # chosen: share of the times in which a camera shows the players as the others see them; in ten synthetic recordings
 # with three cameras 0.6 or more, of one turned by half a degree or more 0 to 0.34
 _HARDLY, _MOSTLY = 0.15, 0.5
@@ -110,7 +110,7 @@ class CameraCheck:
         if len({moment.time_s for moment in moments}) < _FEWEST_TIMES or n < 2:
             return []
         lag_s, sd_s = (each[:n] for each in solve_lags(lag_equations(moments)))
-        is_off = np.abs(np.nan_to_num(lag_s)) > np.maximum(_ALARM_SDS * np.nan_to_num(sd_s), _LEAST_S)
+        is_off = np.abs(np.nan_to_num(lag_s)) > np.maximum(ALARM_SDS * np.nan_to_num(sd_s), _LEAST_S)
         if n > 2 and is_off[1:].all() and len(set(np.sign(lag_s[1:]))) == 1:  # all but the clock agree
             lag_s, is_off = np.array([-lag_s[1:].mean(), *[0.0] * (n - 1)]), np.arange(n) == 0
         return [

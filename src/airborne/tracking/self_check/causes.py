@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from airborne.constants import ALARM_SDS
 from airborne.tracking.self_check.nuisances import Kind, Nuisance, widen
 from airborne.tracking.self_check.solution import NuisanceSolution
 from airborne.types import Array
 
-_ALARM_SDS = 3.0  # from zero: a false alarm in 370, were errors normal
 _LEAST_EVIDENCE = 4.0  # [nats] by which a cause must explain the pictures better than none
 _SAME = 3.0  # [nats] within which two causes cannot be told apart
 _MOST_CAUSES = 3  # that are named one after the other
@@ -115,7 +115,7 @@ def _log_likelihood(solution: NuisanceSolution, prior: Array) -> float:
 
 def _is_clear(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> bool:
     value, sd = _size(solution, nuisance, widen(prior, nuisance))
-    return abs(value) > _ALARM_SDS * sd
+    return abs(value) > ALARM_SDS * sd
 
 
 def _size(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> tuple[float, float]:
