@@ -134,6 +134,24 @@ def test_new_writes_one_trial_for_videos_of_players_named_by_their_cameras_alone
     assert trial.calibration.control_points is not None and trial.has_players and trial.start.find
 
 
+def test_new_takes_trial_for_the_only_word_beside_the_camera(tmp_path):
+    write(tmp_path / "jump1_left.mp4", "")
+    for name in ("calib.toml", "body.toml"):
+        write(tmp_path / name, "")
+    study = write_study(tmp_path, "{trial}_{camera}.mp4", tmp_path)
+    (listed,) = list_trials(str(tmp_path / "trials"))
+    assert (listed.name, listed.labels) == ("jump1", {})
+    trial = read_trial(study.trials[0])
+    assert trial.path(trial.camera[0].video).is_file()
+
+
+@pytest.mark.parametrize("pattern", ["{athlete}_{trial}_{camera}.mp4", "{folder}/{camera}.mp4"])
+def test_new_refuses_labels_that_a_batch_would_refuse(tmp_path, pattern):
+    with pytest.raises(AirborneError, match=r"\{(trial|folder)\} cannot be a label, .* such as \{number\}"):
+        write_study(tmp_path, pattern, tmp_path / "study")
+    assert not (tmp_path / "study").exists()
+
+
 def test_new_leaves_files_that_exist_alone(tmp_path):
     write(tmp_path / "videos" / "x_left.mp4", "")
     write(tmp_path / "study" / "session.toml", "# mine\n")

@@ -47,7 +47,7 @@ def test_lengths_near_the_statures_shares_are_taken_without_a_word():
 
 def test_the_width_of_the_hips_is_checked_too():
     wide = with_joint_widths(BODY, {"pelvis": 1.2})
-    (warning,) = check_lengths(length_ratios(wide, BODY), POINTS, in_cam2)
+    (warning,) = check_lengths(length_ratios(wide, BODY), POINTS, in_cam2, 1.0)
     assert warning.startswith("hip width 1.20 of the length that the stature gives; check the clicks of hip")
 
 
@@ -102,7 +102,7 @@ def test_widths_alone_that_are_off_question_the_mass():
         check_body(human18(1.7, 65.0), human18(1.7, 65.0 * 2.2046))
     ratios = {"shoulder": 0.69, "shoulder width": 0.71, "upper_arm": 0.82}  # the one that is refused is a width
     with pytest.raises(BodyError, match=r"^shoulder 0\.69 of .* of which about 0\.50 would fit"):
-        check_lengths(ratios, POINTS, in_cam2)
+        check_lengths(ratios, POINTS, in_cam2, 1.0)
 
 
 def test_a_body_is_compared_with_the_person_of_its_own_height():

@@ -133,3 +133,11 @@ def test_a_table_says_of_how_many_moments_it_is_and_where_they_are_few():
     few, many = (agreement_table([analyse_agreement(series(rng.normal(size=n)))]) for n in (3, 300))
     assert [text.splitlines()[1].split()[2] for text in (few, many)] == ["3", "300"]
     assert "few frames: these numbers are rough" in few and "few" not in many
+
+
+def test_a_single_value_has_a_difference_and_no_limits():
+    row = analyse_agreement(series(np.array([2.0])))
+    assert row.bias.value == 2.0 and np.isnan([*row.lower_limit, *row.upper_limit]).all()
+    head, line, *notes = agreement_table([row]).splitlines()
+    assert len(line.split()) == len(head.replace("95 % limits", "limits").split()) + 1 and " to " not in line
+    assert "of a single value" in notes[-1] and "no limits of agreement" in notes[-1]

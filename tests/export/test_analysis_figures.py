@@ -60,6 +60,7 @@ def test_residuals_are_drawn_with_and_without_a_cutoff_used(tmp_path):
         ((-0.00328, -0.217, 0.21), "0.00 [−0.22, 0.21] mm"),
         ((1.5, -30.0, 33.0), "2 [−30, 33] mm"),
         ((0.0, 0.0, 0.0), "0.00 [0.00, 0.00] mm"),
+        ((-1.5, np.nan, np.nan), "−1.50 mm, no limits"),
     ],
 )
 def test_limits_have_equally_many_decimals_and_a_true_minus(numbers, text):

@@ -7,7 +7,7 @@ import pytest
 from airborne.body import surface_arrays
 from airborne.cameras import Rig
 from airborne.errors import VideoError
-from airborne.export.overlays import LONGEST_SIDE_PX, OverlayVideos
+from airborne.export.overlays import LONGEST_SIDE_PX, OverlayVideos, draw_label
 from airborne.export.palette import STATUS_RGB
 from airborne.export.views import resample_view
 from airborne.rendering import FLAT, render
@@ -59,6 +59,19 @@ def test_a_segment_that_is_in_doubt_has_the_colour_of_an_uncertain_frame(tmp_pat
     for picture, status in ((sure, Status.TRACKED), (doubtful, Status.UNCERTAIN)):
         off = {each: far_from(picture[at], rgb) for each, rgb in STATUS_RGB.items()}
         assert min(off, key=off.__getitem__) is status
+
+
+@pytest.mark.parametrize("height", [48, 240, 1080])
+def test_a_label_holds_the_cameras_name_where_it_fits_and_never_hides_the_time(height):
+    blank, near, far, long = (np.full((height, 4 * height, 3), SCENE_GREY, np.uint8) for _ in range(4))
+    for image, name in ((blank, ""), (near, "cam1"), (far, "日本"), (long, "x" * 80)):
+        draw_label(image, "frame 3", name, STATUS_RGB[Status.TRACKED])
+    is_box = (blank != SCENE_GREY).any(axis=2)
+    numbers = int(np.flatnonzero(is_box.any(axis=0)).max()) - np.count_nonzero(is_box.any(axis=1)) // 2  # their end
+    for image in (near, far, long):
+        np.testing.assert_array_equal(image[:, :numbers], blank[:, :numbers])
+        assert image[:, numbers:].max() > SCENE_GREY + 50
+    assert not np.array_equal(near, far)
 
 
 def test_a_lost_frame_has_a_border_and_no_outline(tmp_path):

@@ -124,10 +124,13 @@ def test_a_comparison_with_paths_of_joints_becomes_a_table(tmp_path):
     assert "Joints tracked: 100%; of these more than 100 mm off: 0." in html
 
 
-def test_a_number_missing_from_the_summary_is_named(tmp_path):
-    summary = {"name": "a throw", **headline(run())}
-    del summary["n_lost"]
-    with pytest.raises(ResultError, match="has no n_lost; track again"):
+@pytest.mark.parametrize("key", ["n_lost", "turns_s", "angular_momentum_sd_kg_m2_s"])
+def test_a_number_missing_from_the_summary_is_named(tmp_path, key):
+    motion = person_run()
+    flight = flight_summary(motion, measure_flight(motion, PERSON)).to_dict()
+    summary = {"name": "a throw", **headline(motion), "flight": flight}
+    del (flight if key in flight else summary)[key]
+    with pytest.raises(ResultError, match=f"has no {key}, as of an older version; track again"):
         write_report(tmp_path, summary)
 
 

@@ -49,6 +49,15 @@ def test_a_good_trial_has_a_line_for_each_thing(folder):
     assert checks.mistakes == []
     heads = ["trial.toml", "cam1", "cam2", "cam3", "videos", "calibration", "body", "frames", "start", "videos"]
     assert [line.split(": ")[0] for line in checks.well] == heads
+    assert checks.well[-1] == "videos: no sign at the start that cameras' videos were exchanged"
+
+
+def test_a_start_that_shows_nothing_of_exchanged_videos_says_so(folder):
+    position = re.search(r"position_m = .*", (folder / "trial.toml").read_text(encoding="utf-8")).group()
+    aside = "position_m = [0.6, 0.0, 0.5]"  # seen by all cameras; the cross is elsewhere
+    checks = check_trial(edit(folder, (position, aside)))
+    assert checks.mistakes == []
+    assert checks.well[-1].startswith("videos: what moves at the start does not show whether any were exchanged")
 
 
 def test_a_video_that_was_not_copied_whole_says_so(folder):
@@ -234,7 +243,7 @@ def test_lines_are_reported_as_they_are_found(folder):
 def test_players_are_checked_against_the_cameras(tmp_path):
     path = write_trial(tmp_path / "trial", 3)
     *_, start, videos = check_trial(path).well
-    assert start.startswith("start: frame 0, Anna") and videos.startswith("videos: no sign")
+    assert start.startswith("start: frame 0, Anna") and videos.startswith("videos: no sign at the start that")
 
 
 def exchange_sides(path, *parts):

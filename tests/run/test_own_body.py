@@ -13,6 +13,7 @@ from airborne.body.outfits import Border
 from airborne.body_fitting.fit import BodyFit
 from airborne.cameras import Rig
 from airborne.errors import MistakesError, TrialError
+from airborne.export.mosaic import _GAP_PX, _LEFT_PX
 from airborne.run.own_body import (
     _CELL_PX,
     _LINE_RGB,
@@ -89,10 +90,13 @@ def test_a_person_is_fitted_to_the_frames_of_two_keys_and_drawn_over_them(tmp_pa
     )
     np.testing.assert_allclose(read, joints, atol=1e-6)
     image = cv2.imread(str(person.picture))
-    assert image.shape == (2 * _CELL_PX, 3 * _CELL_PX, 3)  # rows are frames, columns cameras
-    is_line = (image == _LINE_RGB[::-1]).all(axis=2)
-    cells = is_line.reshape(2, _CELL_PX, 3, _CELL_PX).sum(axis=(1, 3))
+    edge, step = _LEFT_PX, _CELL_PX + _GAP_PX  # one line of text is as high as names are wide
+    rows, columns = slice(edge, edge + 2 * step), slice(edge, edge + 3 * step)  # of frames, of cameras
+    is_line, is_text = (image == _LINE_RGB[::-1]).all(axis=2), (image < 128).all(axis=2)
+    cells = is_line[rows, columns].reshape(2, step, 3, step).sum(axis=(1, 3))
     assert (cells > 400).all()  # each cell has the outline
+    assert is_text[:edge, columns].reshape(edge, 3, step).any(axis=(0, 2)).all()  # the cameras' names
+    assert is_text[rows, :edge].reshape(2, step, edge).any(axis=(1, 2)).all()  # the frames'
 
 
 def test_exchanged_videos_are_refused_as_where_the_trial_is_tracked(shared_data, tmp_path):

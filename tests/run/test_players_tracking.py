@@ -30,6 +30,7 @@ TABLES = {
     *("joints.csv", "tables/joints.parquet", "jumps.csv"),
     *("summary.json", "run.json", "calib.toml"),
 }
+OF_TRIAL = {"[start]", "[lights]", "[calibration]", "[body]", "[[camera]]"}
 PICTURES = {
     *("report.html", "figures/heights.png"),
     *("videos/overlay_left.mp4", "videos/overlay_right.mp4", "videos/pictures.json"),
@@ -85,7 +86,7 @@ def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     assert _describe(summary, tmp_path / "run").count(doubt) == 1
     assert summary["bystanders"] == [BYSTANDER]
     assert summary["events"] == []
-    assert set(summary["inputs"]) == {"left.mkv", "right.mkv", "calib.toml", "start and lights"}
+    assert set(summary["inputs"]) == {"left.mkv", "right.mkv", "calib.toml", *OF_TRIAL}
     assert summary["timings_s"]["tracking_a_frame"] * 12 == pytest.approx(summary["timings_s"]["tracking"])
     assert summary["tables"] == ["joints.csv", "jumps.csv", "tables/joints.parquet"]
     assert "live" not in summary
@@ -246,7 +247,7 @@ def test_live_pipes_end_with_an_interrupt_and_keep_whole_results(tmp_path, monke
         thread.join(5)
     assert len(run.motion) >= 1 and run.motion.index[-1] < 40
     assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
-    assert set(run.summary["inputs"]) == {"calib.toml", "start and lights"}
+    assert set(run.summary["inputs"]) == {"calib.toml", *OF_TRIAL}
 
 
 def _send(folder, name):

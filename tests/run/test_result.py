@@ -1,19 +1,25 @@
 """A run as a value: what its folder holds, as labelled arrays."""
 
+import csv
 import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
 
+from airborne.body import Pose
 from airborne.errors import BodyError, ResultError
-from airborne.motion import landmarks, measure_jumps
+from airborne.motion import landmarks, measure_flight, measure_jumps
 from airborne.motion.jumps.table import JUMP_COLUMNS
 from airborne.motion.labelled import label_jumps
 from airborne.run import result
+from airborne.run.body_tables import write_tables
 from airborne.run.result import Run
 from tests.support import jumping, players_trial
 from tests.support.export_scenes import BOX, PERSON, person_run
 from tests.support.export_scenes import run as box_run
+from tests.support.motions import motion_of, small_covariance
+from tests.support.tolerances import ROUNDTRIP
 
 
 def run_of(folder, monkeypatch, motion, model):
@@ -54,6 +60,25 @@ def test_flight_needs_masses(tmp_path, monkeypatch):
     assert run_of(tmp_path, monkeypatch, person_run(), PERSON).flight["com"].dims == ("time", "space")
     with pytest.raises(BodyError, match="no mass"):
         _ = run_of(tmp_path, monkeypatch, box_run(), BOX).flight
+
+
+def test_flight_in_code_has_the_deviations_of_the_table_where_the_frame_rate_is_wrong(tmp_path, monkeypatch):
+    turns = [
+        RigidTransform.from_components([0, 0, 1 + 2 * t - 9.81 / 2 * t**2], Rotation.from_rotvec([0, 0, 5 * t]))
+        for t in np.arange(30) / 50
+    ]
+    poses = [Pose(world_from_root=turn, joint_angles=np.zeros((len(PERSON.segments) - 1, 3))) for turn in turns]
+    motion = motion_of(PERSON, poses, rate_hz=60, covariance=small_covariance(PERSON))
+    write_tables(tmp_path, motion, PERSON)
+    with (tmp_path / "tables" / "flight.csv").open(newline="") as file:
+        table = [float(row["L_z_kg_m2_s_sd"]) for row in csv.DictReader(file)]
+    run = run_of(tmp_path, monkeypatch, motion, PERSON)
+    stated = run.flight["angular_momentum_sd"].sel(space="z")
+    np.testing.assert_allclose(stated, table, rtol=ROUNDTRIP)
+    assert (stated > 2 * measure_flight(motion, PERSON)["angular_momentum_sd"].sel(space="z")).all()
+    (band,) = run.plot("flight").axes[3].collections
+    low, high = (limit(path.vertices[:, 1]) for path in band.get_paths() for limit in (np.min, np.max))
+    assert high - low >= 4 * np.max(table)
 
 
 def test_statuses_of_joints_are_drawn(tmp_path, monkeypatch):

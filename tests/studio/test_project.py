@@ -75,8 +75,11 @@ def test_a_run_is_ready_once_it_is_finished(tmp_path):
     )
     assert track_step() == (
         "needs you",
-        "results is of another start, calibration, body or camera than now; track again",
+        "results is of another [body] than now; track again",
     )
+    after = {step.name: (step.state, step.says) for step in steps(read_project(folder, folder / "trial.toml"))}
+    assert after["Review"] == ("empty", "results (before the change)")
+    assert after["Results"] == ("empty", "tables (before the change)")
 
 
 def test_what_the_steps_say_is_looked_at_again_after_every_change(tmp_path):

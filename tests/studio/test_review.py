@@ -82,3 +82,16 @@ def test_a_run_is_searched_for_doubt_and_compared_with_another(folder):
         page.get_by_role("button", name="Next lost or unseen: 1").click()
         wait_for_frame(page, UNCERTAIN - 1)
         page.wait_for_function("document.querySelector('canvas.view').view.shown.overlay.label.endsWith('lost')")
+
+
+def test_on_a_small_screen_pictures_are_the_largest_part_of_the_page(folder):
+    shutil.rmtree(folder / "second")
+    with fork_studio(folder) as address, open_page(address.replace("/?", "/review?")) as page:
+        page.set_viewport_size({"width": 1024, "height": 700})
+        page.get_by_role("button", name="Next uncertain").wait_for()
+        page.locator("canvas.view").wait_for()
+        page.wait_for_function(
+            "['view', 'curves'].map((name) => document.querySelector(`canvas.${name}`)?.clientHeight)"
+            ".every((height, at) => at ? height <= 150 : height >= 260)",
+            timeout=30_000,
+        )

@@ -52,6 +52,7 @@ def test_an_athletes_tables_stand_between_the_trials_and_the_sessions(tmp_path):
         ('labels = { condition = "dry" }', "needs the label athlete; this trial has: condition, trial; add it"),
         ('labels = { athlete = "anna" }\nathletes = 3', "athletes: unknown key"),
         ('labels = "anna"', "needs the label athlete"),
+        ('labels = { athlete = "anna", trial = "3" }', "the label trial is 3, but .trial. .* name, throw_3"),
     ],
 )
 def test_what_is_wrong_is_one_line(tmp_path, text, said):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import tomlkit
 
+from airborne.batch.trials import OWN_COLUMNS
 from airborne.errors import AirborneError, VideoError
 from airborne.io.names import check_column
 from airborne.io.writing import write_text
@@ -37,7 +38,8 @@ def write_study(
     """Write session.toml and trials/<name>.toml into a folder, for the videos whose paths below `videos` fit a pattern.
 
     Words in braces, as in "{athlete}_{condition}_{number}_{camera}.mp4", become labels; `{camera}` tells the videos of
-    one trial apart; alone, it stands for the videos of one trial. Paths of calibration and body are as seen from
+    one trial apart; alone, it stands for the videos of one trial. `{trial}`, which in a session is the name of the
+    trial's file, may be the only other word. Paths of calibration and body are as seen from
     `folder`, and may hold the words; a calibration that ends in .csv is a table of control points, the body "legs" that
     of players, who are looked for. A camera whose first video is flagged as interlaced gets its `fields`. Files that
     exist are left alone. Raises AirborneError for a pattern that is none, or that fits no video.
@@ -50,13 +52,19 @@ def write_study(
             f"pattern {pattern}: expected {{camera}}, and of several trials other words in braces, each once, such as "
             "{athlete}_{condition}_{number}_{camera}.mp4"
         )
+    labels = [word for word in words if word not in (_CAMERA, _ALONE)]
+    own = [word for word in words if word in OWN_COLUMNS]
+    if own and (labels or own != [_ALONE]):
+        raise AirborneError(
+            f"pattern {pattern}: {{{own[0]}}} cannot be a label, as a batch's table has a column of that name; call it "
+            "otherwise, such as {number}"
+        )
     found = _match(videos, pattern)
     if not found:
         names = sorted(path.relative_to(videos).as_posix() for path in videos.rglob("*") if path.is_file())
         there = f"it holds {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" if names else "it is empty"
         raise AirborneError(f"{videos}: no file's path fits {pattern}: {there}; write it as seen from that folder")
     cameras = sorted({camera for by_camera in found.values() for camera in by_camera})
-    labels = [word for word in words if word != _CAMERA]
     folder.mkdir(parents=True, exist_ok=True)
     from_session = Path(os.path.relpath(videos.absolute(), folder.absolute())).as_posix()
     session = folder / SESSION
@@ -73,7 +81,7 @@ def write_study(
     _write_new(session, _session_text(tables, calibration=calibration, body=body))
     for values, by_camera in sorted(found.items()):
         files.append(folder / TRIALS / f"{'_'.join(values) or _ALONE}.toml")
-        _write_new(files[-1], _trial_text(dict(zip(labels, values, strict=True))))
+        _write_new(files[-1], _trial_text(dict(zip(labels, values, strict=bool(labels)))))
         missing = [camera for camera in cameras if camera not in by_camera]
         if missing:
             notes.append(f"{files[-1].name}: no video of {', '.join(missing)}; give it its own [[camera]] tables")

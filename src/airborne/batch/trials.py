@@ -17,7 +17,7 @@ from airborne.io.text import read_csv, read_toml
 from airborne.trial.file import read_tables
 
 TABLE = "trials.csv"
-_OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
+OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
 _ALWAYS_TRIAL = "trial.toml"  # the name of a trial file that is named after its folder
 _MEANT_AS_TRIAL = re.compile(r"^[ \t]*(\[\[camera|session[ \t]*=)", re.MULTILINE)
 _OF_A_SESSION = {"calibration", "body", "athletes"}  # a file with labels and one of these may be what trials share
@@ -108,7 +108,7 @@ def _describe(path: Path, labels: Mapping[str, str]) -> BatchTrial:
     except ValueError as error:
         raise TrialError(f"{path}: {error}") from None
     labels = _own_labels(path) | dict(labels)
-    own = [label for label in labels if label in _OWN_COLUMNS]
+    own = [label for label in labels if label in OWN_COLUMNS]
     if own:
         raise TrialError(f"{path}: a label is called {own[0]}, as a column of the batch's table is; rename it")
     return BatchTrial(name, path, labels)

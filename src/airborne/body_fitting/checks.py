@@ -40,7 +40,7 @@ def person_of_shares(given: BodyModel) -> BodyModel:
 
 
 def check_lengths(
-    ratios: Mapping[str, float], points: Mapping[str, Sequence[str]], look: WhereToLook, height: float = 1.0
+    ratios: Mapping[str, float], points: Mapping[str, Sequence[str]], look: WhereToLook, height: float
 ) -> list[str]:
     """Check segments' lengths, as ratios to the stature's shares by stem; return warnings, a line each.
 

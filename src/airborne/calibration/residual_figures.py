@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.calibration.from_sources import RigCalibration
 from airborne.calibration.sources.board_detection import first_image
 from airborne.io.figures import save_png
 from airborne.io.names import file_stem
+from airborne.types import Array
 
 _INCHES, _LEAST_INCHES = 9.0, 6.0  # of a figure's longer side; least width, for the title
-_ARROW_SHARE = 0.06  # of an image's longer side: the length of an arrow of the median residual
-_MOST_ARROWS = 1500  # in a figure, drawn at random
+# chosen on a wand's 6000 points and on 30 control points: sides of the squares that hold one arrow each, as shares of
+# an image's longer side, and the percentile of the residuals whose arrow is as long as that
+_LEAST_SQUARE, _MOST_SQUARE, _LONG_PERCENT = 1 / 32, 1 / 16, 90
+_FEW = 100  # chosen: of a source's points, such as control points, that are all drawn
 _COLOURS = ("#d95f02", "#1b9e77", "#7570b3", "#e7298a", "#66a61e", "#e6ab02")
+
+
+class _Seen(NamedTuple):
+    """What one camera saw of a source."""
+
+    name: str
+    colour: str  # the same in all cameras
+    px: Array  # (n, 2)
+    residual_px: Array  # (n, 2) seen minus expected
 
 
 def write_residual_figures(folder: Path, calibration: RigCalibration) -> list[Path]:
@@ -46,22 +61,18 @@ def _write_figure(path: Path, calibration: RigCalibration, i: int) -> Path:
         example = first_image(calibration.inputs.sources, calibration.inputs.sources.camera[i])
     if example is not None:
         axes.imshow(example, cmap="gray", vmin=-500, vmax=300)  # pale, so that arrows stand out
-    rng = np.random.default_rng(0)
-    typical = _typical_px(calibration, i)
-    magnified, arrows = _ARROW_SHARE * max(width, height) / 2 / typical, None
-    for number, (source, residual) in enumerate(
-        zip(calibration.adjustment.sources, calibration.adjustment.residual_px, strict=True)
-    ):
-        rows = np.flatnonzero((source.camera == i) & np.isfinite(residual[:, 0]))
-        if len(rows) > _MOST_ARROWS:
-            rows = np.sort(rng.choice(rows, _MOST_ARROWS, replace=False))
-        if not len(rows):
-            continue
-        colour, (u, v) = _COLOURS[number % len(_COLOURS)], source.px[rows].T
-        du, dv = -residual[rows].T * magnified
+    seen = _seen_by(calibration, i)
+    distances = np.concatenate([np.linalg.norm(each.residual_px, axis=1) for each in seen] or [np.ones(1)])
+    typical, long = (max(float(np.percentile(distances, share)), 1e-3) for share in (50, _LONG_PERCENT))
+    side = np.sqrt(width * height / len(distances))
+    side = float(np.clip(side, _LEAST_SQUARE * max(width, height), _MOST_SQUARE * max(width, height)))
+    magnified, arrows = side / long, None
+    for each, is_drawn in zip(seen, one_per_square([each.px for each in seen], side), strict=True):
+        colour, (u, v), (du, dv) = each.colour, each.px[is_drawn].T, -each.residual_px[is_drawn].T * magnified
         arrows = axes.quiver(u, v, du, dv, color=colour, angles="xy", scale_units="xy", scale=1, width=0.0015)
-        rms = np.sqrt(np.mean(np.sum(residual[rows] ** 2, axis=1)))
-        axes.plot(u, v, ".", color=colour, markersize=2, label=f"{source.name}: {len(rows)} seen, RMS {rms:.2f} px")
+        rms = np.sqrt(np.mean(np.sum(each.residual_px**2, axis=1)))
+        n = f"{len(each.px)} seen" if is_drawn.all() else f"{np.count_nonzero(is_drawn)} of {len(each.px)} drawn"
+        axes.plot(u, v, ".", color=colour, markersize=2, label=f"{each.name}: {n}, RMS {rms:.2f} px")
     axes.set_xlim(-0.5, width - 0.5)
     axes.set_ylim(height - 0.5, -0.5)
     axes.set_aspect("equal")
@@ -73,12 +84,25 @@ def _write_figure(path: Path, calibration: RigCalibration, i: int) -> Path:
     return path
 
 
-def _typical_px(calibration: RigCalibration, i: int) -> float:
-    distances = np.concatenate(
-        [
-            np.linalg.norm(residual[source.camera == i], axis=1)
-            for source, residual in zip(calibration.adjustment.sources, calibration.adjustment.residual_px, strict=True)
-        ]
-    )
-    distances = distances[np.isfinite(distances)]
-    return max(float(np.median(distances)) if len(distances) else 1.0, 1e-3)
+def _seen_by(calibration: RigCalibration, i: int) -> list[_Seen]:
+    """Return what one camera saw of each source of which it saw anything."""
+    seen = []
+    of_sources = zip(calibration.adjustment.sources, calibration.adjustment.residual_px, strict=True)
+    for number, (source, residual) in enumerate(of_sources):
+        rows = np.flatnonzero((source.camera == i) & np.isfinite(residual[:, 0]))
+        if len(rows):
+            seen.append(_Seen(source.name, _COLOURS[number % len(_COLOURS)], source.px[rows], residual[rows]))
+    return seen
+
+
+def one_per_square(px: Sequence[Array], side_px: float) -> list[NDArray[np.bool_]]:
+    """Say which points (n, 2) of each source are drawn: one in each square of an image, and all of a small source."""
+    if not px:
+        return []
+    n, points = np.array([len(each) for each in px]), np.concatenate(px)
+    source = np.repeat(np.arange(len(px)), n)
+    order = np.lexsort((np.random.default_rng(0).random(len(points)), n[source]))
+    _, first = np.unique(np.floor(points[order] / side_px), axis=0, return_index=True)
+    is_drawn = n[source] <= _FEW
+    is_drawn[order[first]] = True
+    return np.split(is_drawn, np.cumsum(n)[:-1])

@@ -37,17 +37,22 @@ _AGAINST, _BETWEEN = "Against ", "Between "  # how paragraphs of results begin
 
 
 def agreement_table(rows: Sequence[Agreement]) -> str:
-    """Return agreement as a short plain table; a line below it says where there are few moments."""
+    """Return agreement as a short plain table; lines below it say where there are few moments, or one."""
     table = [("agreement", "n", "bias", "95 % limits", "RMSE", "nRMSE", "ICC(A,1)", "SEM")]
     for row in rows:
-        limits = f"{_number(row.lower_limit.value)} to {_number(row.upper_limit.value)}"
+        has_limits = math.isfinite(row.lower_limit.value)
+        limits = f"{_number(row.lower_limit.value)} to {_number(row.upper_limit.value)}" if has_limits else "-"
         share = or_dash(row.nrmse_percent.value / 100, ".2%")
         icc = or_dash(row.icc.agreement.value, ".4f")
         name, errors = f"  {row.name} [{row.unit}]", (_number(row.bias.value), limits, _number(row.rmse.value))
         table.append((name, str(row.n), *errors, share, icc, _number(row.sem.value)))
     lines = align_columns(table, (16, 6, 9, 19, 9, 8, 10, 9))
-    if rows and min(row.n for row in rows) < _FEW:
+    if any(1 < row.n < _FEW for row in rows):
         lines.append("  few frames: these numbers are rough; agreement.csv holds the 95 % interval of each")
+    if any(row.n == 1 for row in rows):
+        lines.append(
+            "  of a single value, as of one jump, there is a difference, and no limits of agreement, ICC or SEM"
+        )
     return "\n".join(lines)
 
 

@@ -211,9 +211,10 @@ def best_time_shift(
     """
     if len(time_s) < 2 or math.isnan(unshifted_mm):
         return 0.0, unshifted_mm
-    period, best, n_unshifted = float(np.median(np.diff(time_s))), (0.0, unshifted_mm), error_at(0.0)[1]
-    for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1):
-        error_mm, n = error_at(step * period)
+    period, best = float(np.median(np.diff(time_s))), (0.0, unshifted_mm)
+    shifted = {step: error_at(step * period) for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1)}
+    n_unshifted = shifted[0][1]
+    for step, (error_mm, n) in shifted.items():
         if n >= _MOST_FRAMES * n_unshifted and error_mm < min(best[1], clearly_better * unshifted_mm):
             best = step * period, error_mm
     return best

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from airborne.evaluation import Agreement, Series
+from airborne.evaluation.compare import or_dash
 from airborne.export import panels
 from airborne.io.figures import save_png
 from airborne.motion.smoothing import ResidualAnalysis
@@ -87,11 +88,15 @@ def write_bland_altman(path: Path, variables: Sequence[tuple[Series, Agreement]]
 
 
 def format_limits(row: Agreement) -> str:
-    """Return bias and limits of agreement, all with as many decimals as show two digits of the limits' distance."""
+    """Return bias and limits of agreement, all with as many decimals as show two digits of the limits' distance.
+
+    A single difference has no limits, which is said.
+    """
     bias, low, high = (each.value for each in (row.bias, row.lower_limit, row.upper_limit))
     distance = high - low
     decimals = max(0, 1 - floor(log10(distance))) if isfinite(distance) and distance > 0 else 2
-    text = f"{bias:.{decimals}f} [{low:.{decimals}f}, {high:.{decimals}f}] {row.unit}"
+    limits = f"[{low:.{decimals}f}, {high:.{decimals}f}] {row.unit}" if isfinite(distance) else f"{row.unit}, no limits"
+    text = f"{bias:.{decimals}f} {limits}"
     return re.sub(r"-(0\.?0*)(?![\d.])", r"\1", text).replace("-", "−")  # no minus before zero
 
 
@@ -103,7 +108,7 @@ def write_identity(path: Path, variables: Sequence[tuple[Series, Agreement]]) ->
         ends = [float(min(measured.min(), reference.min())), float(max(measured.max(), reference.max()))]
         axes.plot(ends, ends, color=_OTHER, linewidth=0.8)
         _points(axes, series.drop_missing(), reference, measured)
-        title = f"{row.name}\nICC(A,1) {row.icc.agreement.value:.4f}"
+        title = f"{row.name}\nICC(A,1) {or_dash(row.icc.agreement.value, '.4f')}"
         axes.set_title(title, fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_xlabel(f"reference [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)
         axes.set_ylabel(f"measured [{row.unit}]", fontsize=panels.FONT_PT - 1, color=panels.TEXT)

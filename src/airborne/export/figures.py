@@ -22,8 +22,8 @@ from airborne.motion import (
     has_inertias,
     joint_angles,
     known_landmarks,
-    measure_flight,
     root_angles,
+    state_flight,
 )
 from airborne.motion.joints import doubtful_segments, main_joints
 from airborne.tracking import Status
@@ -189,7 +189,7 @@ def flight_figure(motion: Motion, model: BodyModel) -> Figure:
 
     Raises BodyError where a segment has no inertia, ResultError where the motion is another body's.
     """
-    table = measure_flight(motion, model)
+    table, _ = state_flight(motion, model)
     com, momentum = (
         [table[name].sel(space=axis).to_numpy() for name in (quantity, f"{quantity}_sd")]
         for quantity, axis in (("com", "z"), ("angular_momentum", list("xyz")))

@@ -20,6 +20,7 @@ _TEXT_PX = 20  # size of titles and names: 7 points in print
 _MARGIN_PX, _GAP_PX = 10, 8  # around everything; between cells
 _FINER = 4  # text is drawn so many times larger
 _LINE = 1.3  # height of a line over the size of its letters
+_LEFT_PX = _MARGIN_PX + round(_LINE * _TEXT_PX) + _GAP_PX  # of the names beside the rows
 _MISSING = "no picture"  # stands in a cell without an image
 
 
@@ -45,9 +46,21 @@ def write_mosaic(
     width; with fewer the picture is narrower.
     """
     n = len(titles) if n_columns is None else n_columns
-    left = _MARGIN_PX + round(_LINE * _TEXT_PX) + _GAP_PX
-    width = (_WIDTH_PX - left - _MARGIN_PX) // n - _GAP_PX
-    height = round(aspect * width)
+    width = (_WIDTH_PX - _LEFT_PX - _MARGIN_PX) // n - _GAP_PX
+    page = draw_mosaic(rows, names, titles, cell_px=(width, round(aspect * width)))
+    with explain_full_disk(path):
+        path.write_bytes(encode_png(page))
+
+
+def draw_mosaic(
+    rows: Sequence[Sequence[Image | None]],
+    names: Sequence[str],
+    titles: Sequence[ColumnTitle],
+    *,
+    cell_px: tuple[int, int],
+) -> Image:
+    """Draw images as `write_mosaic` does, in cells of a width and height [px]: (h, w, 3)."""
+    (width, height), left = cell_px, _LEFT_PX
     n_lines = max(title.text.count("\n") + 1 for title in titles)
     top = _MARGIN_PX + round(n_lines * _LINE * _TEXT_PX) + _GAP_PX
     size = top + len(rows) * (height + _GAP_PX) + _MARGIN_PX, left + len(titles) * (width + _GAP_PX) + _MARGIN_PX
@@ -61,8 +74,7 @@ def write_mosaic(
         for j, image in enumerate(row):
             x = left + j * (width + _GAP_PX)
             _fill_cell(page[y : y + height, x : x + width], image)
-    with explain_full_disk(path):
-        path.write_bytes(encode_png(page))
+    return page
 
 
 def _write_lines(image: Image, title: ColumnTitle) -> None:

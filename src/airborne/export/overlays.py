@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from airborne.body import PosedBody
 from airborne.cameras import Camera, Rig
 from airborne.export.film import Film
+from airborne.export.lettering import draw_text
+from airborne.export.lettering import text_width as width_of
 from airborne.export.palette import STATUS_RGB
 from airborne.export.pictures import encode_png
 from airborne.export.views import cached_surface_arrays, resample_view
@@ -129,7 +131,7 @@ class OverlayVideos:
                     _draw_outline(image, shown, STATUS_RGB[Status.UNCERTAIN])
             if status is Status.LOST:
                 _draw_border(image, STATUS_RGB[status])
-            draw_label(image, time_label(frames, status), STATUS_RGB[status])
+            draw_label(image, time_label(frames, status), camera.name, STATUS_RGB[status])
             images.append(image)
         self._videos.write(frames.index, images)
 
@@ -186,16 +188,19 @@ def _draw_border(image: Image, rgb: tuple[int, int, int]) -> None:
     cv2.rectangle(image, (line // 2, line // 2), (width - 1 - line // 2, height - 1 - line // 2), rgb, line)
 
 
-def draw_label(image: Image, text: str, rgb: tuple[int, int, int]) -> None:
-    """Write light text on a dark box in the top left corner, with a square of the status's colour before it."""
+def draw_label(image: Image, text: str, name: str, rgb: tuple[int, int, int]) -> None:
+    """Write light text on a dark box in the top left corner, before it a square of the status's colour, then a name."""
     em = max(round(image.shape[0] * _TEXT_SHARE), 10)
     scale, margin = em / 30, em // 2
     (text_width, text_height), _ = cv2.getTextSize(text, _FONT, scale, 1)
-    box = image[margin : margin + 2 * text_height, margin : margin + text_width + 4 * text_height]
+    name_at = 7 * text_height // 2 + text_width
+    right = margin + name_at + round(width_of(name, size_px=text_height)) + text_height
+    box = image[margin : margin + 2 * text_height, margin:right]
     box[:] = box // 5
     cv2.rectangle(box, (text_height // 2, text_height // 2), (3 * text_height // 2, 3 * text_height // 2), rgb, -1)
     at = (5 * text_height // 2, 3 * text_height // 2)
     cv2.putText(box, text, at, _FONT, scale, (255, 255, 255), 1, cv2.LINE_AA)
+    draw_text(box, name, (name_at, at[1]), size_px=text_height, rgb=(255, 255, 255))
 
 
 def line_px(image: Image) -> int:

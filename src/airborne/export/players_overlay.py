@@ -72,7 +72,7 @@ class PlayersOverlayVideos:
                 for each in found if view is not None else ():
                     own = [each.joint_status[k] for k in at]
                     _draw_rods(image, camera, each.player, points=each.points[at], statuses=own)
-                draw_label(image, time_label(frames, status), STATUS_RGB[status])
+                draw_label(image, time_label(frames, status), camera.name, STATUS_RGB[status])
             images.append(image)
         self._videos.write(frames.index, images)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +13,7 @@ from airborne.export.page import UNKNOWN_TEXT, HtmlTable, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.export.viewer import Viewer
 from airborne.io.writing import write_text
-from airborne.motion import Motion
+from airborne.motion import FlightSummary, Motion
 from airborne.motion.flight.momentum_table import GRAVITY_M_S2
 from airborne.motion.run_folder import REPORT, figures_of
 
@@ -127,12 +128,16 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     - `flight`: `FlightSummary.to_dict()`
 
     Units stand at the ends of keys (`_s`, `_px`, ...) and are shown as such. All text is escaped. Of the figures and
-    the contact sheet, those in the folder are shown. Raises ResultError where a number of the headline is missing.
+    the contact sheet, those in the folder are shown. Raises ResultError where a number of the headline or the
+    flight is missing.
     """
     summary = json_ready(summary)
-    missing = sorted({"name", *headline(Motion.collect([]))} - {"turns_s"} - set(summary))  # older runs lack it
+    missing = {"name", *headline(Motion.collect([]))} - set(summary)
+    if summary.get("flight"):
+        missing |= {each.name for each in fields(FlightSummary)} - set(summary["flight"])
     if missing:
-        raise ResultError(f"the summary of {folder} has no {', '.join(missing[:3])}; track again")
+        named = ", ".join(sorted(missing)[:3])
+        raise ResultError(f"the summary of {folder} has no {named}, as of an older version; track again")
     if "whole_run" in summary and "method" in summary:
         surface = SURFACES[summary["whole_run"]]
         summary = {**summary, "method": {**summary["method"], "whole_run": f"fitted by {surface}"}}
@@ -165,7 +170,7 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "cannot be seen", "turns: in every frame some direction of the orientation is hidden"
     else:
         for turn in ("somersault", "twist"):
-            yield _turns(head[f"{turn}_rev"], head.get(f"{turn}_rev_sd")), f"{turn}, first to last pose that shows it"
+            yield _turns(head[f"{turn}_rev"], head[f"{turn}_rev_sd"]), f"{turn}, first to last pose that shows it"
         low, high = head["tilt_range_deg"]
         yield UNKNOWN_TEXT if low is None else f"{round(low)}° to {round(high)}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
@@ -252,7 +257,7 @@ def _self_check_table(findings: Sequence[Mapping[str, Any]]) -> HtmlTable | None
 
 def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:
     names = ("angular_momentum_kg_m2_s", "angular_momentum_sd_kg_m2_s", "angular_momentum_spread_kg_m2_s")
-    mean, sd, scatter = (flight.get(name, [None] * 3) for name in names)
+    mean, sd, scatter = (flight[name] for name in names)
     rows = [
         (f"angular momentum about {axis} [kg m²/s]: mean over the frames, standard deviation of its error", *pair)
         for axis, *pair in zip("xyz", mean, sd, strict=True)

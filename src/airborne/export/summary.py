@@ -106,7 +106,8 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
             f"In {head['n_near_singular']} frames tilt is within 5° of ±90°: somersault and twist mean little there, "
             "and their numbers of turns may be miscounted. The quaternions are sound."
         )
-    if (turns_s := head.get("turns_s")) and turns_s[0] is not None:
+    turns_s = head["turns_s"]
+    if turns_s[0] is not None:
         late, early = turns_s[0] - head["start_s"], head["start_s"] + head["duration_s"] - turns_s[1]
         if max(late, early) > _MUCH_LATER * head["duration_s"] and not head["n_lost"]:
             yield (

@@ -8,7 +8,13 @@ Independent of cameras, images and truth.
 
 from airborne.motion.angles import root_angles
 from airborne.motion.files import MotionWriter, drop_rows, read_estimates, read_motion, revise_motion, sort_rows
-from airborne.motion.flight.momentum_table import FlightSummary, flight_summary, has_inertias, measure_flight
+from airborne.motion.flight.momentum_table import (
+    FlightSummary,
+    flight_summary,
+    has_inertias,
+    measure_flight,
+    state_flight,
+)
 from airborne.motion.joints import JointStatus, joint_angles, joint_statuses, known_landmarks, landmarks
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.jump import Jump
@@ -40,6 +46,7 @@ __all__ = [
     "revise_motion",
     "root_angles",
     "sort_rows",
+    "state_flight",
     "write_angles",
     "write_flight",
     "write_joint_angles",

@@ -121,7 +121,7 @@ def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
 def write_flight(path: Path, motion: Motion, table: xr.Dataset) -> None:
     """Write flight.csv: the centre of mass, the angular momentum about it, the root's rotation, units in the names.
 
-    The table is that of `measure_flight`.
+    The table is that of `state_flight`.
     """
     columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
     for name, stem in (("com", "com_{}_m"), ("angular_momentum", "L_{}_kg_m2_s")):

@@ -9,14 +9,13 @@ from airborne.body import BodyModel
 from airborne.motion import (
     Motion,
     has_inertias,
-    measure_flight,
+    state_flight,
     write_angles,
     write_flight,
     write_joint_angles,
     write_joints,
     write_motion_parquet,
 )
-from airborne.motion.flight.momentum_table import widen_momentum, wrong_flight
 from airborne.motion.joints import count_statuses
 from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, JOINTS, tables_of
 from airborne.tracking.self_check.free_flight import WrongFall
@@ -29,7 +28,7 @@ class Measured(NamedTuple):
     """What a summary takes from the tables."""
 
     joint_statuses: dict[str, dict[str, int]] | None  # of `count_statuses`; None of a body without joints
-    flight: xr.Dataset | None  # of `measure_flight`; None without joints or masses
+    flight: xr.Dataset | None  # of `state_flight`; None without joints or masses
     wrong_fall: WrongFall | None = None  # what the flight says against the calibration or the frame rate
 
 
@@ -45,9 +44,7 @@ def write_tables(folder: Path, motion: Motion, model: BodyModel) -> Measured:
     statuses = count_statuses(status, model)
     if not has_inertias(model):
         return Measured(statuses, None)
-    flight = measure_flight(motion, model)
-    wrong = wrong_flight(motion, flight)
-    flight = widen_momentum(flight, wrong)
+    flight, wrong = state_flight(motion, model)
     write_flight(folder / FLIGHT, motion, flight)
     return Measured(statuses, flight, wrong)
 

@@ -13,7 +13,7 @@ from airborne.run.detections import read_trial_detections
 from airborne.run.find import require_two_cameras
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
-from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
+from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds, undecided_mix_ups
 from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source
 from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
@@ -23,7 +23,10 @@ from airborne.video import Recording, VideoFacts, inspect
 
 _T = TypeVar("_T")
 _UNEQUAL = 0.05  # chosen: of the first camera's duration; cameras stopped one after the other differ by less
-_NO_MIX_UP = "videos: no sign that cameras' videos were exchanged"
+_NO_MIX_UP = "videos: no sign at the start that cameras' videos were exchanged"
+_UNDECIDED = (
+    "videos: what moves at the start does not show whether any were exchanged or mirrored; tracking may show it"
+)
 
 
 class Checks:
@@ -186,8 +189,10 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
                 checks.add(f"note: {unseen}")
             if len(recording.rig) > 1:
                 with start_foregrounds(recording) as foregrounds:
+                    seen = recording.rig, list(foregrounds), model, found.pose
                     checks.attempt(
-                        lambda: refuse_mix_ups(recording.rig, foregrounds, model, found.pose), lambda _: _NO_MIX_UP
+                        lambda: refuse_mix_ups(*seen),
+                        lambda _: _UNDECIDED if undecided_mix_ups(*seen) else _NO_MIX_UP,
                     )
     for event in recording.events:
         checks.add(f"note: {event}")

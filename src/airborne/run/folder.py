@@ -44,8 +44,6 @@ from airborne.motion.run_folder import (
 )
 from airborne.trial.file import Trial
 
-_START_AND_LIGHTS = "start and lights"  # stands among the input files for the tables that a trial file itself holds
-_TABLES_OF_A_TRIAL = "[start], [lights], [calibration], [body] or [[camera]]"
 START = "start"  # stands for the digest of the first key, which other digests hold
 _BEFORE_A_RUN = {CANDIDATES, CANDIDATES_PICTURE}  # what a start that is undecided leaves
 
@@ -127,8 +125,7 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
     differing = [key for key in {**before, **now} if before.get(key) != now.get(key)]
     if name == "settings":
         return "; ".join(f"{key} = {before.get(key)}, now {now.get(key)}" for key in differing)
-    said = [_TABLES_OF_A_TRIAL if key == _START_AND_LIGHTS else key for key in differing]
-    return f"other {', '.join(said)}" if name == "inputs" else f"other {name}"
+    return f"other {', '.join(differing)}" if name == "inputs" else f"other {name}"
 
 
 def stretches_between(recorded: dict[str, Any], identity: dict[str, Any]) -> list[tuple[float, float]]:
@@ -254,28 +251,36 @@ def _key_digests(trial: Trial) -> dict[str, str]:
 
 
 def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
-    """Return the SHA-256 of each input file, by the name that the trial gives it; live video has none."""
+    """Return the SHA-256 of each input file, by the name that the trial gives it, and of tables that it holds itself.
+
+    Live video has none.
+    """
     names = [*(camera.video for camera in trial.camera if not live), *trial.input_files, *_further_files(trial)]
-    return {name: file_digest(trial.path(name)) for name in names} | {_START_AND_LIGHTS: _tables_digest(trial)}
+    return {name: file_digest(trial.path(name)) for name in names} | _table_digests(trial)
 
 
-def has_other_tables(trial: Trial, folder: Path) -> bool:
-    """Say whether a trial's start, lights, calibration, body or cameras have changed since its run in a folder.
+def changed_tables(trial: Trial, folder: Path) -> list[str]:
+    """Return which of a trial's [start], [lights], [calibration], [body], [[camera]] changed since its run in a folder.
 
-    Not of what lies in files; nor where the start is found, as the run holds it as it was found.
+    Not of what lies in files; nor of a start that is found, as the run holds it as it was found.
     """
     record = folder / RUN_RECORD
-    if trial.start.find or not record.is_file():
-        return False
-    inputs = read_record(record).get("inputs")
-    recorded = inputs.get(_START_AND_LIGHTS) if isinstance(inputs, dict) else None
-    return recorded is not None and recorded != _tables_digest(trial)
+    inputs = read_record(record).get("inputs") if record.is_file() else None
+    recorded = inputs if isinstance(inputs, dict) else {}
+    digests = _table_digests(trial).items()
+    changed = [name for name, digest in digests if recorded.get(name, digest) != digest]
+    return [name for name in changed if not (trial.start.find and name == "[start]")]
 
 
-def _tables_digest(trial: Trial) -> str:
-    tables = [trial.start, trial.lights, trial.calibration, trial.body, *trial.camera]
-    text = json.dumps([table and table.model_dump() for table in tables])
-    return hashlib.sha256(text.encode()).hexdigest()
+def _table_digests(trial: Trial) -> dict[str, str]:
+    tables = {
+        "[start]": trial.start.model_dump(),
+        "[lights]": trial.lights and trial.lights.model_dump(),
+        "[calibration]": trial.calibration.model_dump(),
+        "[body]": trial.body.model_dump(),
+        "[[camera]]": [camera.model_dump() for camera in trial.camera],
+    }
+    return {name: hashlib.sha256(json.dumps(table).encode()).hexdigest() for name, table in tables.items()}
 
 
 def _further_files(trial: Trial) -> list[str]:

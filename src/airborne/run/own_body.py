@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose, surface_arrays
 from airborne.body.files import write_body
@@ -27,6 +26,7 @@ from airborne.body_fitting.fit import BodyFit, BodyObservation, fit_body, measur
 from airborne.cameras import Rig
 from airborne.cameras.detections import landmarks_from_points
 from airborne.errors import BodyError, TrialError
+from airborne.export.mosaic import ColumnTitle, draw_mosaic
 from airborne.export.pictures import encode_png
 from airborne.export.views import crop_camera, resample_view
 from airborne.io.writing import missing_folder
@@ -41,13 +41,13 @@ from airborne.tracking.first_pose import LANDMARK_WEIGHTS
 from airborne.trial.file import Trial
 from airborne.trial.keys import KeyTable
 from airborne.trial.start import StartTable
-from airborne.types import Array, StageProgress
+from airborne.types import Array, Image, StageProgress
 from airborne.video import Frames, Recording
 
 _N_SCENERY = 10  # further frames that show the scene without the person
 PICTURE = "fit_body.png"
 _CELL_PX, _CELL_SCALE = 400, 0.4  # a cell of the image, and its pixel size in pixels of `crop_camera`
-_LINE_RGB, _EMPTY_GREY = (255, 230, 0), 60  # sRGB of the outline; grey of a cell without an image
+_LINE_RGB = (255, 230, 0)  # sRGB of the outline
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +116,7 @@ def fit_person(
         raise BodyError("; ".join([f"{trial.name}: {error}", *trial.body.doubts(model), *recording.events])) from error
     picture = output.with_name(PICTURE)
     write_body(output, fit.model)
-    picture.write_bytes(_contact_sheet(fit, [observations[index].frames for index in chosen]))
+    picture.write_bytes(_contact_sheet(fit, [observations[index].frames for index in chosen], recording.rig))
     return PersonFit(
         fit, tuple(chosen), picture, tuple(dict.fromkeys([*model.notes, *recording.events, *notes, *warnings]))
     )
@@ -221,20 +221,21 @@ def _read(
     return observations
 
 
-def _contact_sheet(fit: BodyFit, frames: Sequence[Frames]) -> bytes:
-    """Draw the fitted body over every image used, as a PNG: rows are times, columns cameras."""
-    rows = []
-    for each, pose in zip(frames, fit.poses, strict=True):
-        rows.append(np.concatenate([_cell(each, i, fit.model, pose) for i in range(len(each.views))], axis=1))
-    return encode_png(np.concatenate(rows))
+def _contact_sheet(fit: BodyFit, frames: Sequence[Frames], rig: Rig) -> bytes:
+    """Draw the fitted body over every image used, as a PNG: rows are times, columns cameras, both with their names."""
+    rows = [
+        [_cell(each, i, fit.model, pose) for i in range(len(rig))] for each, pose in zip(frames, fit.poses, strict=True)
+    ]
+    titles, names = [ColumnTitle(name) for name in rig.names], [f"frame {each.index}" for each in frames]
+    return encode_png(draw_mosaic(rows, names, titles, cell_px=(_CELL_PX, _CELL_PX)))
 
 
-def _cell(frames: Frames, camera: int, model: BodyModel, pose: Pose) -> NDArray[np.uint8]:
-    """Draw one camera's image around the body, with lines where a part borders on another or on the scene."""
+def _cell(frames: Frames, camera: int, model: BodyModel, pose: Pose) -> Image | None:
+    """Draw one camera's image around the body, with lines where parts border on each other or on the scene, if any."""
     view, posed = frames.views[camera], model.with_pose(pose)
     crop = None if view is None else crop_camera(view.camera, posed)
     if view is None or crop is None:
-        return np.full((_CELL_PX, _CELL_PX, 3), _EMPTY_GREY, np.uint8)
+        return None
     middle = (_CELL_SCALE - 1) / 2
     larger = crop.resample(scale=(_CELL_SCALE, _CELL_SCALE), offset=(middle, middle), size=(_CELL_PX, _CELL_PX))
     image = resample_view(view, larger)

@@ -7,18 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from airborne.constants import ALARM_SDS
 from airborne.geometry.even_sample import EvenSample
 from airborne.tracking import Status
 from airborne.tracking.camera_lags import solve_lags
 from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, moment_of
 from airborne.tracking.capsules.occlusion import shows_player
-from airborne.tracking.capsules.track import CameraShift
 from airborne.tracking.players import PlayersStep
 from airborne.video import Frames
 
 _MOST_MOMENTS, _FEWEST_TIMES = 100, 20  # chosen: of a player that are kept; of all that say something
 _EVERY = 2  # chosen, frames apart: neighbours err alike, and a moment costs a tenth of a frame's tracking
-_ALARM_SDS = 3.0  # chosen: as of a body, one in 370 right cameras is accused
 # chosen: share of the times in which a camera shows the players as the others see them; in ten synthetic recordings
 # with three cameras 0.6 or more, of one turned by half a degree or more 0 to 0.34
 _HARDLY, _MOSTLY = 0.15, 0.5
@@ -31,13 +30,13 @@ class _Shifted:
     def __init__(self, first_s: float) -> None:
         self.first_s, self.last_s, self.n_times = first_s, first_s, 0
         self.suspects: Counter[int] = Counter()
-        self.shifts: EvenSample[CameraShift] = EvenSample(_MOST_MOMENTS)
+        self.right_down_px: EvenSample[tuple[float, float]] = EvenSample(_MOST_MOMENTS)
 
-    def add(self, time_s: float, shift: CameraShift) -> None:
+    def add(self, time_s: float, suspects: Sequence[int | None], right_down_px: tuple[float, float]) -> None:
         """Keep a time, in their order."""
         self.last_s, self.n_times = time_s, self.n_times + 1
-        self.suspects.update(view for view in (shift.view, shift.or_view) if view is not None)
-        self.shifts.offer(lambda: shift)
+        self.suspects.update(view for view in suspects if view is not None)
+        self.right_down_px.offer(lambda: right_down_px)
 
     def describe(self, names: Sequence[str], n_times: int) -> str:
         """Say it of a run of so many times."""
@@ -48,7 +47,7 @@ class _Shifted:
                 f"self-check: the cameras disagree where the players are {when}: {', '.join(who[:-1])} or {who[-1]} "
                 "was moved, or calibrated wrongly; joints are uncertain there; leave out each (--cameras) and compare"
             )
-        right, down = (float(np.median(each)) for each in zip(*(each[1:3] for each in self.shifts), strict=True))
+        right, down = np.median([*self.right_down_px], axis=0).tolist()
         ways = (abs(right), "right of" if right > 0 else "left of"), (abs(down), "below" if down > 0 else "above")
         where = " and ".join(f"{px:.0f} px {way}" for px, way in ways if px >= 0.5)
         return (
@@ -71,8 +70,11 @@ class CameraCheck:
         """Keep a time of the tracker `Blocker`, or not."""
         self._n_times += 1
         registration, time_s = step.state.registration, float(frames.time_s)
-        if registration.shift is not None and np.isfinite(registration.shift.right_px):
-            self._shifted.setdefault(registration.left_out, _Shifted(time_s)).add(time_s, registration.shift)
+        shift = registration.shift
+        if shift is not None and shift.right_down_px is not None:
+            self._shifted.setdefault(registration.left_out, _Shifted(time_s)).add(
+                time_s, (shift.view, shift.or_view), shift.right_down_px
+            )
         found = [each for each in step.players if each.status is not Status.LOST]
         for each in found:
             is_shown = shows_player(step.state.players[each.player].colours.occlusion)
@@ -110,7 +112,7 @@ class CameraCheck:
         if len({moment.time_s for moment in moments}) < _FEWEST_TIMES or n < 2:
             return []
         lag_s, sd_s = (each[:n] for each in solve_lags(lag_equations(moments)))
-        is_off = np.abs(np.nan_to_num(lag_s)) > np.maximum(_ALARM_SDS * np.nan_to_num(sd_s), _LEAST_S)
+        is_off = np.abs(np.nan_to_num(lag_s)) > np.maximum(ALARM_SDS * np.nan_to_num(sd_s), _LEAST_S)
         if n > 2 and is_off[1:].all() and len(set(np.sign(lag_s[1:]))) == 1:  # all but the clock agree
             lag_s, is_off = np.array([-lag_s[1:].mean(), *[0.0] * (n - 1)]), np.arange(n) == 0
         return [

@@ -15,7 +15,7 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError, ResultError, require_choice
 from airborne.export.figures import flight_figure, joint_status_figure, joints_figure, pose_figure
 from airborne.export.players_report import heights_figure
-from airborne.motion import Motion, PlayersMotion, measure_flight, measure_jumps
+from airborne.motion import Motion, PlayersMotion, measure_jumps, state_flight
 from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players, label_root
 from airborne.motion.run_folder import holds_players, read_body_run, read_players_run, read_summary
 
@@ -112,7 +112,7 @@ class Run:
 
         Raises BodyError for a body without masses.
         """
-        return measure_flight(self.motion, self.body)
+        return state_flight(self.motion, self.body)[0]
 
     @cached_property
     def jumps(self) -> xr.Dataset:

@@ -27,7 +27,10 @@ from airborne.types import Array
 # of the sizes of body and world, chosen: at a rate 10 % too low those of a throw were 23.2 and 23.4 %
 _ALIKE = 0.1
 _CLEARLY_ROUGH = 1.5  # chosen: a factor on standard deviations from which on it is said
-_REMEDIES = {"time_s": ": run `airborne sync`, then track again"}  # by the kind of a finding that is an alarm
+_REMEDIES = {  # by the kind of a finding that is an alarm
+    "time_s": ": run `airborne sync`, then track again",
+    "drift_s": "; write it anew with the rate at which it was filmed, then track again",
+}
 _UNKNOWN_SIZE = (
     "self-check: to one camera only a free fall shows how large a body is, and none was measured: "
     "distances are as right as the sizes in the body's file"

@@ -15,7 +15,7 @@ from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError, one_line
 from airborne.io.folder_lock import find_writer
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
-from airborne.run.folder import has_other_tables
+from airborne.run.folder import changed_tables
 from airborne.studio.clicks import count_clicked, read_clicked
 from airborne.studio.folder import files_inside, outer_links, path_inside, readable_files
 from airborne.studio.named_files import read_inner_tables, refuse_outer_meshes
@@ -228,20 +228,21 @@ def _start_state(project: Project) -> tuple[StepState, str]:
     return "needs you", "where is the body?"
 
 
-def _is_outdated(project: Project, run: Path) -> bool:
-    """Say whether the trial's tables have changed since a run; no where they cannot be read."""
+def _changed_tables(project: Project, run: Path) -> list[str]:
+    """Return which of the trial's tables have changed since a run; none where they cannot be read."""
     try:
-        return has_other_tables(project.trial(), run)
+        return changed_tables(project.trial(), run)
     except AirborneError:
-        return False
+        return []
 
 
 def _run_steps(project: Project) -> Iterator[StudioStep]:
     runs = list_runs(project.folder)
     is_prepared = all(state == "ready" for state, _ in (_cameras_state(project), _body_state(project)))
     finished, says = [run for run in runs if (run / SUMMARY).is_file()], ""
-    if finished and _is_outdated(project, finished[0]):
-        says = f"{finished[0].name} is of another start, calibration, body or camera than now; track again"
+    changed = _changed_tables(project, finished[0]) if finished else []
+    if changed:
+        says = f"{finished[0].name} is of another {' and '.join(changed)} than now; track again"
         yield StudioStep("Track", "/track", "needs you", says)
     elif finished:
         yield StudioStep("Track", "/track", "ready", finished[0].name)
@@ -251,7 +252,9 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
         yield StudioStep("Track", "/track", "empty" if is_going_on else "needs you", says)
     else:
         yield StudioStep("Track", "/track", "needs you" if is_prepared else "empty", "follow the body")
-    yield StudioStep("Review", "/review", "ready" if finished else "empty", runs[0].name if runs else "no run yet")
+    of_run: StepState = "ready" if finished and not changed else "empty"
+    before = " (before the change)" if changed else ""
+    yield StudioStep("Review", "/review", of_run, f"{runs[0].name}{before}" if runs else "no run yet")
     files = sorted(path.name for path in project.folder.glob("digitised_*_*[0-9].csv"))  # not the paths of joints
     state: StepState = "ready" if files else "empty"
     yield StudioStep("Digitise", "/digitise", state, files[-1] if files else "points by hand, to compare")
@@ -259,6 +262,6 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
     yield StudioStep(
         "Results",
         "/results",
-        "ready" if finished else "empty",
-        "report" if reports else "tables" if finished else says or "no run yet",
+        of_run,
+        f"{'report' if reports else 'tables'}{before}" if finished else says or "no run yet",
     )

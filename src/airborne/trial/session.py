@@ -18,11 +18,17 @@ def join_session(tables: dict[str, Any], session: dict[str, Any], path: Path) ->
 
     The trial's name is that of its file `path` where it gives none. In the session's texts `{trial}` is the trial's
     name and `{athlete}`, or any other word in braces, the trial's label of that name. Raises TrialError where a trial
-    lacks one.
+    lacks one, or has a label `trial` that is not its name.
     """
     tables = {"name": path.stem, **{key: value for key, value in tables.items() if key != "session"}}
     labels = tables.get("labels", {})
-    words = {**(labels if isinstance(labels, dict) else {}), "trial": tables["name"]}
+    labels = labels if isinstance(labels, dict) else {}
+    words = {**labels, "trial": tables["name"]}
+    if "trial" in labels and str(labels["trial"]) != str(tables["name"]):
+        raise TrialError(
+            f"{path.name}: the label trial is {str(labels['trial'])[:40]}, but {{trial}} in a session is the trial's "
+            f"name, {str(tables['name'])[:40]}; rename the label"
+        )
     athletes = session.get("athletes", {})
     long = [key for key, value in words.items() if len(str(value)) > _LONGEST_WORD]
     if long:

@@ -9,10 +9,12 @@ from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.fit import evidence_of, pixel_weight
 from airborne.tracking.capsules.kernel_arguments import NOBODY
-from airborne.tracking.capsules.registration import _evidence_by_shift
+from airborne.tracking.capsules.registration import _disagreement, _evidence_by_shift, _leave_each_out
 from airborne.tracking.capsules.surface_colours import learn_unoccluded
+from airborne.tracking.capsules.track import CameraShift
 from airborne.tracking.capsules.views import map_evidence, map_scale, player_regions
 from tests.support.jumping_scenes import SIDE_BY_SIDE, Hall, errors_mm, hop, share_within
+from tests.support.tolerances import ROUNDTRIP
 
 N = 36
 ALONE, PAIR = Hall({"anna": hop()}), Hall({"anna": hop(), "ben": hop(SIDE_BY_SIDE, late_s=0.1)})
@@ -40,8 +42,7 @@ def followed(hall, shifts, n=N):
 def test_it_is_left_out_and_the_others_track_on(camera):
     registrations, players = followed(PAIR, lambda index: {camera: (14, -5)})
     assert {each.left_out for each in registrations} == {camera}
-    shift = registrations[-1].shift
-    np.testing.assert_allclose((shift.right_px, shift.down_px), (14, -5), atol=3)
+    np.testing.assert_allclose(registrations[-1].shift.right_down_px, (14, -5), atol=3)
     for estimates in players:
         assert np.median(errors_mm(PAIR, estimates)) < 30
         assert np.mean([each.status is Status.TRACKED for each in estimates]) > 0.6
@@ -64,6 +65,15 @@ def test_where_it_is_open_which_one_it_is_no_joint_is_tracked_and_intervals_hold
     assert all(each.is_open and 1 in each.suspects for each in registrations)
     assert all(Status.TRACKED not in each.joint_status for each in estimates)
     assert share_within(ALONE, estimates) > 0.9
+
+
+def test_of_a_camera_that_may_not_show_the_players_they_may_be_as_far_off_as_is_sought():
+    state, frames = Blocker(ALONE.starts()).init(), ALONE.frames(0)
+    state, _ = Blocker(ALONE.starts()).step(state, frames)
+    track = state.players["anna"]
+    fits = _leave_each_out(track, [track], frames, None).left_out
+    unseen, seen = (_disagreement(track, fits, CameraShift(1, shift, 2)) for shift in (None, (0.0, 0.0)))
+    np.testing.assert_allclose(unseen - seen, np.tile(0.25 * np.eye(3), (len(unseen), 1, 1)), atol=ROUNDTRIP)
 
 
 def test_of_two_cameras_none_is_accused():

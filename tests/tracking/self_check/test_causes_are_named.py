@@ -42,9 +42,12 @@ def seen_by(rig: Rig, frames: Frames) -> Frames:
 RIG = Rig(SCENE.cameras)
 
 
-def checked(*, rig=RIG, model=CROSS, late_s=0.0):
-    """Check true poses against the pictures, with wrong files; `late_s` of what the second camera shows."""
+def checked(*, rig=RIG, model=CROSS, late_s=0.0, rate=1.0):
+    """Check true poses against the pictures, with wrong files; `late_s` and `rate` of what the second camera shows."""
     frames = frames_seen()
+    if rate != 1:
+        other = Scene(motion=lambda time_s: flung(rate * float(time_s)), cameras=SCENE.cameras)
+        frames = [replace(now, views=(now.views[0], other.frames(now.index).views[1], now.views[2])) for now in frames]
     if late_s:
         shift = round(late_s * FPS)
         frames = [
@@ -123,6 +126,15 @@ def test_what_is_wrong_is_named_first_with_its_size(wrong, subject, kind, value)
     assert first.is_alarm
     assert (first.subject, first.kind) == (subject, kind)
     assert abs(first.value - value) < 2.5 * first.sd < 0.5 * abs(value)
+
+
+@pytest.mark.parametrize("rate", [1.05, 1.1, 0.8])
+def test_a_wrong_frame_rate_is_named_as_lateness_that_grows(rate):
+    first = checked(rate=rate).diagnosis.findings[0]
+    over_the_run_s = (rate - 1) * (len(INDICES) - 1) / FPS
+    assert first.is_alarm and (first.subject, first.kind) == ("cam1", "drift_s")
+    assert abs(first.value - over_the_run_s) < 4 * first.sd < 1.5 * abs(over_the_run_s)
+    assert ("later and later" in first.sentence) == (rate > 1) and "frame rate" in first.sentence
 
 
 def test_intervals_widen_by_what_is_wrong():

@@ -56,6 +56,24 @@ def test_what_shows_for_some_moments_alone_is_not_sure():
     assert mean[0] < sd_by_blocks
 
 
+def test_a_parameter_that_grows_is_found_with_its_growth():
+    evidence, _ = random_evidence(np.array([0.05, -0.02]), n=16, noise=0.1)
+    growth = np.repeat([-1.0, -1 / 3, 1 / 3, 1.0], 4)
+    evidence.offset[:] += 0.03 * growth[:, None, None] * evidence.by_parameter[..., 0]
+    grown = solve(evidence, np.eye(2))[0].with_growth(0)
+    mean, covariance, _ = grown.posterior(np.eye(3))
+    assert np.all(np.abs(mean - [0.05, -0.02, 0.03]) < 4 * np.sqrt(np.diag(covariance)))
+    assert np.sqrt(covariance[2, 2]) < 0.005
+    assert np.allclose([each.posterior(np.eye(3))[0] for each in grown.without], mean, atol=0.01)
+
+
+def test_of_parameters_that_do_not_grow_nothing_changes():
+    solution, _ = solve(random_evidence(np.array([0.05, -0.02]), n=16)[0], np.eye(2))
+    grown = solution.with_row(np.array([1.0, 0.0]), 0.05, 1e-3).with_growth(1)
+    np.testing.assert_allclose(grown.posterior(np.diag([1.0, 1.0, 0.0]))[0][:2], [0.05, -0.02], atol=SOLVED)
+    np.testing.assert_allclose(grown.posterior(np.eye(3))[0], [0.05, -0.02, 0.0], atol=5 * SOLVED)
+
+
 def test_a_row_tells_each_block_the_same():
     evidence, _ = random_evidence(np.array([0.05, -0.02]), noise=0.1)
     row, value = np.array([1.0, 0.0]), 0.3

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.constants import GRAVITY_M_S2
+from airborne.constants import ALARM_SDS, GRAVITY_M_S2
 from airborne.motion.free_fall import GENERIC_NOISE, noise_covariance
 from airborne.tracking.self_check.free_flight import WrongFall
 from airborne.types import Array
@@ -83,7 +83,7 @@ def find_wrong_fall(time_s: Array, path: Array, R: Array, variance: Array) -> Wr
     fall = fit_fall(time_s[rows], path[rows], R[rows])
     sd_m_s2 = float(np.hypot(fall.gravity_sd_m_s2, 8 * _OFFSET_SD_M / np.ptp(time_s[rows]) ** 2))
     off = fall.gravity_m_s2 / GRAVITY_M_S2 - 1
-    if not max(3 * sd_m_s2 / GRAVITY_M_S2, _LEAST_WRONG) < abs(off) < _MOST_WRONG:
+    if not max(ALARM_SDS * sd_m_s2 / GRAVITY_M_S2, _LEAST_WRONG) < abs(off) < _MOST_WRONG:
         return None
     large, high = ("large", "high") if off > 0 else ("small", "low")
     of_rate = abs(np.sqrt(1 + off) - 1)

@@ -101,6 +101,16 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     return xr.Dataset(variables, coordinates, {"history": history})
 
 
+def state_flight(motion: Motion, model: BodyModel) -> tuple[xr.Dataset, WrongFall | None]:
+    """Return `measure_flight` with the sds that tables and figures state, and what its fall says against the run.
+
+    A fall that speaks against the calibration or the frame rate widens the sds of the angular momentum.
+    """
+    table = measure_flight(motion, model)
+    wrong = wrong_flight(motion, table)
+    return widen_momentum(table, wrong), wrong
+
+
 def centres_of_mass(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     """Return `com` of `measure_flight` and its variances, both (n, 3) [m, m2]; raises as that does."""
     require_body(motion, model)
@@ -151,13 +161,10 @@ def widen_momentum(table: xr.Dataset, wrong: WrongFall | None) -> xr.Dataset:
     return table.assign(angular_momentum_sd=(sd.dims, np.hypot(sd.to_numpy(), share * np.abs(momentum)), sd.attrs))
 
 
-def wrong_flight(motion: Motion, table: xr.Dataset | None) -> WrongFall | None:
-    """Return what a flight, as `measure_flight` gives it, says against the calibration or the frame rate.
-
-    table: None of a body without masses, of which nothing is known.
-    """
+def wrong_flight(motion: Motion, table: xr.Dataset) -> WrongFall | None:
+    """Return what a flight, as `measure_flight` gives it, says against the calibration or the frame rate."""
     rows = np.flatnonzero(motion.has_pose)
-    if table is None or len(rows) < 2:
+    if len(rows) < 2:
         return None
     com, sd = (table[name].to_numpy()[rows] for name in ("com", "com_sd"))
     variance = np.where(np.isfinite(sd[:, 2]), sd[:, 2], UNKNOWN_SD_M) ** 2

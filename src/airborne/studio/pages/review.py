@@ -80,7 +80,7 @@ async def review_page(session: Session) -> None:
                 jumps.view = view
                 changed[:] = [list_anew, correction.reread]
 
-        with ui.element("div").classes("row-line"):
+        with ui.element("div").classes("row-line tools"):
             choice = ui.select(list(names), label="run", value=names[0], on_change=change)
             choice.props("outlined dense options-dense").style("min-width: 180px")
             beside = ui.select([""], label="Compare with", value="", on_change=change)

@@ -166,7 +166,7 @@ def _suspect(players: Sequence[_Fits], *, is_known: bool) -> CameraShift | None:
         rivals = [other.view for each, other in others if each > gain - _CLEARLY]
         return shift._replace(or_view=rivals[0] if rivals else None)
     (gain, view), (second, _), *_ = sorted(((_gain_alone(view, players), view) for view in views), reverse=True)
-    return CameraShift(view, np.nan, np.nan, None) if gain > max(0.0, second + _CLEARLY) else None
+    return CameraShift(view, None, None) if gain > max(0.0, second + _CLEARLY) else None
 
 
 def _gain_alone(view: int, players: Sequence[_Fits]) -> float:
@@ -189,7 +189,7 @@ def _gain_of(view: int, players: Sequence[_Fits]) -> tuple[float, CameraShift]:
             least = max(least, _LEAST_M / _FARTHEST_M * (len(own.evidence) // 2) * own.step_px)
     gain[np.hypot(*np.meshgrid(steps, steps)) * step_px < least] = -np.inf
     down, right = np.unravel_index(gain.argmax(), gain.shape)
-    return float(gain.max()), CameraShift(view, float(steps[right] * step_px), float(steps[down] * step_px), None)
+    return float(gain.max()), CameraShift(view, (float(steps[right] * step_px), float(steps[down] * step_px)), None)
 
 
 def _total_as_calibrated(fit: _LeftOut) -> float:
@@ -201,12 +201,14 @@ def _total_as_calibrated(fit: _LeftOut) -> float:
 def _disagreement(track: Track, fits: Sequence[_LeftOut], shift: CameraShift) -> Array:
     """Return the covariance (9, 3, 3) [m²] of points that may lie where the cameras besides one of the suspects say.
 
-    They may be as far off besides as the shift is long there.
+    They may be as far off besides as the shift is long there; where a camera does not show the players, as the longest
+    that is sought.
     """
     suspects = [each for each in fits if each.view in (shift.view, shift.or_view)]
     apart = np.stack([each.points for each in suspects or fits]) - points_of(track.state)
     farthest = np.linalg.norm(apart, axis=2).argmax(axis=0)
     off = apart[farthest, np.arange(N_POINTS)]
-    of_m = _FARTHEST_M / (len(fits[0].evidence) // 2 * fits[0].step_px)
-    shift_m = of_m * np.hypot(shift.right_px, shift.down_px)
+    farthest_px = len(fits[0].evidence) // 2 * fits[0].step_px
+    shift_px = farthest_px if shift.right_down_px is None else np.hypot(*shift.right_down_px)
+    shift_m = _FARTHEST_M / farthest_px * shift_px
     return off[:, :, None] * off[:, None, :] + shift_m**2 * np.eye(3)

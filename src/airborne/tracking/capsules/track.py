@@ -50,11 +50,10 @@ class Track:
 
 
 class CameraShift(NamedTuple):
-    """A camera that shows the players beside where the other cameras see them."""
+    """A camera that shows the players beside where the other cameras see them, or does not show them."""
 
     view: int
-    right_px: float
-    down_px: float
+    right_down_px: tuple[float, float] | None  # None: it shows none of them where the others do
     or_view: int | None  # another camera that may be at fault instead
 
 

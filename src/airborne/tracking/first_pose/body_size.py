@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from airborne.body import BodyModel
 from airborne.body.inverse_kinematics import PoseFit, fit_pose
+from airborne.constants import ALARM_SDS
 from airborne.tracking.self_check.path import alarm
 from airborne.types import Array
 
@@ -16,7 +17,6 @@ from airborne.types import Array
 # 18 to 32 mm off (RMS) and their size 1.00, sd 0.03; with statures 10 % too small 34 to 63 mm and 1.11, sd 0.02
 _SUSPECT_RMS_M = 0.04  # two recorded people with right statures: 29 and 39 mm
 _SIZE_SD = 0.03  # chosen on the same
-_ALARM_SDS = 3.0  # chosen: as of the self-check, one in 370 right statures is doubted
 _LEAST, _MOST, _STEP = 0.75, 1.35, 0.005  # chosen: sizes that are tried, and how finely
 
 
@@ -56,4 +56,4 @@ def find_wrong_size(
 
     found = minimize_scalar(cost_m2, bounds=(_LEAST, _MOST), method="bounded", options={"xatol": _STEP})
     value = float(found.x) - 1
-    return WrongSize(value, _SIZE_SD) if abs(value) > _ALARM_SDS * _SIZE_SD else None
+    return WrongSize(value, _SIZE_SD) if abs(value) > ALARM_SDS * _SIZE_SD else None

@@ -17,7 +17,7 @@ from airborne.tracking.covariance import SHIFT_SD_PX
 from airborne.tracking.self_check.registration import N_SIMILARITY
 from airborne.types import Array
 
-Kind = Literal["scale", "turn_deg", "shift_m", "focal", "time_s"]
+Kind = Literal["scale", "turn_deg", "shift_m", "focal", "time_s", "drift_s"]
 
 _KINDS_OF_CAMERA: tuple[tuple[Kind, int], ...] = (("turn_deg", 3), ("shift_m", 3), ("focal", 1), ("time_s", 1))
 _PER_CAMERA = 8  # numbers of the kinds above
@@ -32,6 +32,7 @@ _GROSS_SD: Mapping[Kind, float] = {
     "shift_m": 0.5,
     "focal": 0.15,
     "time_s": 0.1,
+    "drift_s": 0.1,
 }
 # sds of what a silhouette is off all run long without any such cause: light, shadow, the body's shape
 _BIAS_SD = np.array([0.2, 0.2, np.radians(0.05), 0.003])  # [px, px, rad, log scale]

@@ -60,6 +60,24 @@ class NuisanceSolution:
         row, value = row / sd, value / sd
         return NuisanceSolution(self.H + np.outer(row, row), self.g + value * row, self.total + value**2, without)
 
+    def with_growth(self, column: int) -> NuisanceSolution:
+        """Let a parameter grow evenly from block to block: a further one is by how much it does from middle to end."""
+        k = len(self.g)
+        maps = np.tile(np.eye(k + 1, k), (len(self.without), 1, 1))  # to k + 1 parameters, in each block
+        maps[:, k, column] = np.linspace(-1, 1, len(maps))
+        H, g, blocks = np.zeros((k + 1, k + 1)), np.zeros(k + 1), []
+        H[:k, :k], g[:k] = self.H, self.g
+        for to_grown, each in zip(maps, self.without, strict=True):
+            own_H, own_g = self.H - each.H, self.g - each.g
+            blocks.append((to_grown @ own_H @ to_grown.T, to_grown @ own_g))
+            H, g = H + blocks[-1][0], g + blocks[-1][1]
+            H[:k, :k], g[:k] = H[:k, :k] - own_H, g[:k] - own_g
+        without = [
+            NuisanceSolution(H - own_H, g - own_g, each.total)
+            for (own_H, own_g), each in zip(blocks, self.without, strict=True)
+        ]
+        return NuisanceSolution(H, g, self.total, without)
+
     def jackknife(self, prior: Array) -> Array:
         """Return the covariance (k, k) of the mean by how it changes without each block of moments (jackknife).
 
