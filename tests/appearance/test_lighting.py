@@ -23,6 +23,7 @@ LIGHT = np.array(  # ambient, normal (3), image coordinates (2)
     ]
 )
 ALBEDO = np.array([[0.8, 0.6, 0.1], [0.2, 0.3, 0.9]], np.float32)
+CLOTH = np.arange(len(ALBEDO), dtype=np.int16)
 FOUND = 5e-3  # of the light: the fit holds its slopes back by a ten-thousandth
 FACET_PX = 5
 
@@ -50,7 +51,7 @@ def ambient_light():
 def test_light_is_fitted_from_a_shaded_body():
     part, normals, observed = body()
     light = ambient_light()
-    sd = fit_light(observed, part, normals, ALBEDO, light, 3, *WHOLE)
+    sd = fit_light(observed, part, normals, ALBEDO, CLOTH, light, 3, *WHOLE)
     np.testing.assert_allclose(light, LIGHT, atol=FOUND)
     assert sd < 2e-3
 
@@ -60,7 +61,7 @@ def test_shadow_over_a_fifth_of_the_body_does_not_matter():
     shadowed = observed.copy()
     shadowed[:, 5:11] *= 0.2
     light = ambient_light()
-    fit_light(shadowed, part, normals, ALBEDO, light, 8, *WHOLE)
+    fit_light(shadowed, part, normals, ALBEDO, CLOTH, light, 8, *WHOLE)
     np.testing.assert_allclose(light, LIGHT, atol=0.03)
 
 
@@ -68,7 +69,7 @@ def test_noise_averages_out_and_its_size_is_returned():
     part, normals, observed = body()
     noise = np.random.default_rng(1).normal(0, 0.02, observed.shape).astype(np.float32)
     light = ambient_light()
-    sd = fit_light(observed + noise, part, normals, ALBEDO, light, 4, *WHOLE)
+    sd = fit_light(observed + noise, part, normals, ALBEDO, CLOTH, light, 4, *WHOLE)
     assert np.abs(light - LIGHT).max() < 0.05
     assert 0.02 < sd < 3 * 1.5 * 0.02
 
@@ -78,10 +79,10 @@ def test_too_few_pixels_leave_the_light_as_it_was():
     few = np.full(SHAPE, -1, np.int16)
     few[10, 10:21] = 0
     light = ambient_light()
-    assert fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE) == 1
+    assert fit_light(observed, few, normals, ALBEDO, CLOTH, light, 3, *WHOLE) == 1
     np.testing.assert_array_equal(light, ambient_light())
     few[10, 10:22] = 0
-    fit_light(observed, few, normals, ALBEDO, light, 3, *WHOLE)
+    fit_light(observed, few, normals, ALBEDO, CLOTH, light, 3, *WHOLE)
     assert np.abs(light - ambient_light()).max() > 0.05
 
 
@@ -91,7 +92,7 @@ def test_mixed_pixels_at_the_borders_of_facets_hardly_count():
     is_border = (y % FACET_PX == 0) | (y % FACET_PX == FACET_PX - 1) | (x % FACET_PX == 0) | (x % FACET_PX == 4)
     mixed = np.where(is_border, 0.8 * observed, observed).astype(np.float32)
     light = ambient_light()
-    fit_light(mixed, part, normals, ALBEDO, light, 8, *WHOLE)
+    fit_light(mixed, part, normals, ALBEDO, CLOTH, light, 8, *WHOLE)
     np.testing.assert_allclose(light, LIGHT, atol=0.04)
 
 
@@ -99,14 +100,14 @@ def test_only_the_window_is_used():
     part, normals, observed = body()
     observed[:, :, 25:] = 9.0
     light = ambient_light()
-    fit_light(observed, part, normals, ALBEDO, light, 3, 0, 0, 25, SHAPE[0])
+    fit_light(observed, part, normals, ALBEDO, CLOTH, light, 3, 0, 0, 25, SHAPE[0])
     np.testing.assert_allclose(light, LIGHT, atol=FOUND)
 
 
 def test_black_body_leaves_a_finite_light():
     part, normals, observed = body()
     light = ambient_light()
-    fit_light(observed, part, normals, np.zeros_like(ALBEDO), light, 3, *WHOLE)
+    fit_light(observed, part, normals, np.zeros_like(ALBEDO), CLOTH, light, 3, *WHOLE)
     assert np.isfinite(light).all()
 
 
@@ -127,7 +128,7 @@ def test_body_lit_by_the_right_light_is_what_was_observed():
 def test_a_faceted_part_keeps_its_light_and_a_smooth_one_gets_its_mean_light():
     part, normals, observed = body()
     lit = shade(LIGHT, part, normals)
-    flatten_shading(part, np.array([True, False]), lit)
+    flatten_shading(part, ALBEDO, np.array([True, False]), CLOTH, lit)
     np.testing.assert_allclose(lit[:, part == 0], observed[:, part == 0], atol=1e-6)
     mean = observed[:, part == 1].mean(axis=1, keepdims=True)
     np.testing.assert_allclose(lit[:, part == 1], np.broadcast_to(mean, (3, (part == 1).sum())), rtol=1e-4)

@@ -30,13 +30,13 @@ def light_planes(image, table, out):
 
 
 @kernel(fastmath=True)
-def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0, x1, y1):
+def fit_light(observed, part, normals, albedo, cloth, coefficients, iterations, x0, y0, x1, y1):
     """Fit coefficients (3, LIGHT_TERMS) in place: albedo * (a + b . n + c . u) is the light observed inside the mask.
 
     u (2,) runs from -1 to 1 over the region. observed (3, h, w) linear light, part (h, w) index or -1, normals
-    (3, h, w) unit, albedo (parts, 3); only the window x0 <= x < x1, y0 <= y < y1 is used. Pixels at a border of
-    the mask or of a face are mixed and count little. With fewer than twelve pixels the coefficients do not change.
-    Returns the robust sd of the residual.
+    (3, h, w) unit, albedo (parts, 3), cloth (parts,) alike for parts of one cloth; only the window x0 <= x < x1,
+    y0 <= y < y1 is used. Pixels at a border of the mask, of a cloth or of a face are mixed and count little. With fewer
+    than twelve pixels the coefficients do not change. Returns the robust sd of the residual.
     """
     inside = 0
     for y in range(y0, y1):
@@ -55,7 +55,7 @@ def fit_light(observed, part, normals, albedo, coefficients, iterations, x0, y0,
                 continue
             scattered = (np.uint64(count) * np.uint64(2654435761)) & np.uint64(0xFFFFFFFF)  # no pattern
             if i < n and (n == inside or scattered < share):
-                confidence[i] = 1 if _is_surrounded(part, normals, y, x) else _BORDER_WEIGHT
+                confidence[i] = 1 if _is_surrounded(part, cloth, normals, y, x) else _BORDER_WEIGHT
                 rows[0, i] = 1
                 rows[4, i], rows[5, i] = _region_coordinates(part, y, x)
                 for k in range(3):
@@ -139,12 +139,12 @@ def _region_coordinates(part, y, x):
 
 
 @kernel(fastmath=True)
-def _is_surrounded(part, normals, y, x):
-    """Say whether the four neighbours show the same part, facing nearly the same way."""
+def _is_surrounded(part, cloth, normals, y, x):
+    """Say whether the four neighbours show the same cloth, facing nearly the same way."""
     h, w = part.shape
     for dy, dx in ((0, -1), (0, 1), (-1, 0), (1, 0)):
         v, u = y + dy, x + dx
-        if not (0 <= v < h and 0 <= u < w) or part[v, u] != part[y, x]:
+        if not (0 <= v < h and 0 <= u < w) or part[v, u] < 0 or cloth[part[v, u]] != cloth[part[y, x]]:
             return False
         cosine = np.float32(0)
         for k in range(3):
@@ -175,23 +175,25 @@ def shade_body(part, normals, albedo, coefficients, x0, y0, lit):
 
 
 @kernel(fastmath=True)
-def flatten_shading(part, is_faceted, lit):
-    """Give every part that is not faceted its mean light: shading does not rotate with a smooth surface.
+def flatten_shading(part, albedo, is_faceted, cloth, lit):
+    """Give every cloth that is not faceted its mean light: shading does not rotate with a smooth surface.
 
     What is left shows how the image would move with the body; see `shade_body` for the arguments.
     """
     _, h, w = lit.shape
-    total, count = np.zeros((len(is_faceted), 3), np.float32), np.zeros(len(is_faceted), np.float32)
+    total, whole = np.zeros((2, len(is_faceted), 3), np.float32)
     for y in range(h):
         for x in range(w):
             p = part[y, x]
             if p >= 0:
-                count[p] += 1
+                c = cloth[p]
                 for k in range(3):
-                    total[p, k] += lit[k, y, x]
+                    total[c, k] += lit[k, y, x]
+                    whole[c, k] += albedo[p, k]
     for y in range(h):
         for x in range(w):
             p = part[y, x]
             if p >= 0 and not is_faceted[p]:
                 for k in range(3):
-                    lit[k, y, x] = total[p, k] / count[p]
+                    if whole[cloth[p], k] > 0:
+                        lit[k, y, x] = albedo[p, k] * (total[cloth[p], k] / whole[cloth[p], k])

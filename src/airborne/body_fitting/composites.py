@@ -84,7 +84,7 @@ def composite_equations(
     total, weights = _weigh(view, residual)
     coverage, shape = np.empty((1, *part.shape), np.float32), np.empty_like(lit)
     blur_planes(covered[None].astype(np.float32), *_taps(view), coverage)
-    flatten_shading(part, render_model.is_faceted, lit)
+    flatten_shading(part, *render_model.paint, lit)
     blur_planes(lit, *_taps(view), shape)
     owner, nearness = np.empty(part.shape, np.int16), np.empty(part.shape, np.float32)
     find_owners(part, inverse_depth, render_model.segment_of_part, owner, nearness)
@@ -109,9 +109,8 @@ def _fit_light(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -
     part, _, normals = view.maps
     surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, view.packed_view, *view.maps)
     height, width = part.shape
-    fit_light(
-        view.observation.observed, part, normals, render_model.albedo, view.light, _LIGHT_ROUNDS, 0, 0, width, height
-    )
+    of_body = part, normals, render_model.albedo, render_model.cloth
+    fit_light(view.observation.observed, *of_body, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
 
 
 def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> NDArray[np.float32]:

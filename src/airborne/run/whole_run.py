@@ -21,6 +21,7 @@ from airborne.errors import ResultError
 from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import falls_freely
 from airborne.motion.flight.phases import body_events
+from airborne.motion.joints import doubtful_segments
 from airborne.motion.smoothing.lost_limbs import bridge_lost_limbs
 from airborne.motion.smoothing.moved_joints import count_moves_as_errors, forget_moved_limbs
 from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run, invert_known, smooth_covariances
@@ -29,6 +30,7 @@ from airborne.tracking import Estimate, Status
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.model_based.image_evidence import ImageEvidence
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.model_based.texture import cut_patches, with_texture
 from airborne.tracking.predictors import PoseHistory
 from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker
 from airborne.types import Progress
@@ -38,6 +40,9 @@ from airborne.video.rereading import Rereading
 # frames whose poses are fitted at once, and those that are fitted with them on either side: memory stays flat
 _WINDOW, _MARGIN = 256, 16
 _N_THREADS = min(os.cpu_count() or 1, 8)  # the kernels let go of Python's lock; each holds the images of a time
+# of a skin whose texture is learned from look to look: of 4, 6 and 8 the one after which three synthetic people whose
+# joints lie elsewhere, and whose clothes end within segments, gain no more
+_N_TEXTURE_STEPS = 6
 _MOST_BYTES = 6e8  # of pictures held at once; others are decoded again for every step
 
 
@@ -71,6 +76,7 @@ def fit_whole_run(
         return None
     found = [estimate for estimate in estimates if estimate.pose is not None]
     images = _RunImages.read(reader, settings, model, found, frozenset(keys), progress)
+    shown = ~doubtful_segments(motion, model)
     position, R, angles, covariance = (
         each.copy() for each in (motion.position, motion.R, motion.joint_angles, motion.covariance)
     )
@@ -79,7 +85,8 @@ def fit_whole_run(
         poses = [motion.pose(row) for row in rows]
         if not is_joined:
             poses = bridge_lost_limbs(model, poses, time_s, motion.covariance[rows], window.stretches)
-        fit = fit_run(model, poses, time_s, window.stretches, _Look(images, window))
+        look = _Look(images, window, shown[rows])
+        fit = fit_run(model, poses, time_s, window.stretches, look, n_steps=images.n_steps)
         covariances = smooth_covariances(model, fit, time_s, window.stretches, motion.covariance[rows])
         for row, pose, each in list(zip(rows, fit.poses, covariances, strict=True))[window.kept]:
             matrix = pose.world_from_root.as_matrix()
@@ -130,6 +137,7 @@ class _RunImages:
     learned: CompensatedState
     surfaces: list[RenderModel] = field(default_factory=list)  # alike, each for one thread at a time
     is_skin: bool = False  # whether they are a smooth skin instead of the body's ellipsoids
+    has_texture: bool = False  # and the colours of its patches are learned, in a light that is fitted
     _held: dict[int, Frames] = field(default_factory=dict)
     _n_read: int = field(default=0)
 
@@ -156,15 +164,39 @@ class _RunImages:
             if estimate.index in fitted and estimate.pose is not None:
                 found.append((frames, estimate.pose))
         skin = fit_skin(model, found)
-        images.is_skin, surface = skin is not None, skin or model
-        images.surfaces = [RenderModel.of(surface, settings.exact_lights) for _ in range(_N_THREADS)]
+        images.is_skin, surface = skin is not None, RenderModel.of(skin or model, settings.exact_lights)
+        images.has_texture = images.is_skin and settings.exact_lights is None
+        images.draw_with(cut_patches(surface) if images.has_texture else surface)
         return images
 
-    def linearise(self, frames: Frames, path: PoseHistory, misfit: float | None, tracked: Estimate) -> ImageEvidence:
+    @property
+    def n_steps(self) -> int:
+        """How many steps fit the run."""
+        return _N_TEXTURE_STEPS if self.has_texture else N_STEPS
+
+    def draw_with(self, surface: RenderModel) -> None:
+        """Compare another surface with the images."""
+        self.surfaces = [surface.copy() for _ in range(_N_THREADS)]
+
+    def learn_texture(self, evidence: Sequence[ImageEvidence]) -> None:
+        """Give the skin the colours that the images showed at the last look."""
+        if self.has_texture:
+            colours = chain.from_iterable(each.colours for each in evidence)
+            self.draw_with(with_texture(self.surfaces[0], list(colours)))
+
+    def linearise(
+        self,
+        frames: Frames,
+        path: PoseHistory,
+        misfit: float | None,
+        tracked: Estimate,
+        shown: NDArray[np.bool_],
+    ) -> ImageEvidence:
         """Return what the images of a time say about the last pose of a path; called by `_N_THREADS` at once."""
         surface = self.surfaces.pop()  # its workspace serves one thread
+        patches = {"shown": shown} if self.has_texture else {}
         try:
-            found = self.tracker.linearise(self.learned, frames, path, misfit, surface=surface)
+            found = self.tracker.linearise(self.learned, frames, path, misfit, surface=surface, **patches)
         finally:
             self.surfaces.append(surface)
         return _tracked_evidence(tracked, path[-1][1], found) if frames.index in self.keys else found
@@ -178,7 +210,7 @@ class _RunImages:
             yield frames
             self._n_read += 1
             if self.progress is not None:
-                self.progress(self._n_read, max(self._n_read, (1 + N_STEPS) * len(self.estimates)))
+                self.progress(self._n_read, max(self._n_read, (1 + self.n_steps) * len(self.estimates)))
 
     def _read(self, wanted: Sequence[int]) -> Iterator[Frames]:
         """Yield frames, which come after those that are held."""
@@ -199,21 +231,26 @@ class _Look:
 
     images: _RunImages
     window: _Window
+    shown: NDArray[np.bool_]  # (n, segments) that surely lie where the poses first had them
     misfits: Sequence[float] = ()  # of the frames, as first seen
 
     def __call__(self, poses: Sequence[Pose]) -> list[ImageEvidence]:
-        """Return what the images say about poses, weighed as at the first look."""
+        """Return what the images say about poses, weighed as at the first look.
+
+        The next look draws the colours that this one saw.
+        """
         images, path, evidence = self.images, list[tuple[Fraction, Pose]](), list[ImageEvidence]()
         estimates, waiting = images.estimates[self.window.first :][: len(poses)], deque[Future[ImageEvidence]]()
         with ThreadPoolExecutor(_N_THREADS) as pool:
             for i, (frames, pose) in enumerate(zip(images.frames(estimates), poses, strict=True)):
                 path.append((frames.time_s, pose))
                 misfit = self.misfits[i] if self.misfits else None
-                waiting.append(pool.submit(images.linearise, frames, tuple(path), misfit, estimates[i]))
+                waiting.append(pool.submit(images.linearise, frames, tuple(path), misfit, estimates[i], self.shown[i]))
                 if len(waiting) > _N_THREADS:
                     evidence.append(waiting.popleft().result())
             evidence += [each.result() for each in waiting]
         self.misfits = [each.misfit for each in evidence]
+        images.learn_texture(evidence)
         return evidence
 
 

@@ -13,6 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
@@ -85,10 +86,11 @@ class CompensatedTracker:
         misfit: float | None = None,
         *,
         surface: RenderModel | None = None,
+        shown: NDArray[np.bool_] | None = None,
     ) -> ImageEvidence:
         """Return what the images say about the newest of the poses in `past`, which is that of the frames."""
         compensated = compensate_offsets(frames, past[-_HISTORY:])
-        return self._tracker.linearise(state.inner, compensated, past[-1][1], misfit, surface=surface)
+        return self._tracker.linearise(state.inner, compensated, past[-1][1], misfit, surface=surface, shown=shown)
 
 
 def compensate_offsets(frames: Frames, past: PoseHistory, degree: int = 2) -> Frames:

@@ -15,7 +15,7 @@ from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.absent_segments import absence_costs_in_fitted_light, absence_costs_in_known_light
 from airborne.tracking.model_based.blur import RADIUS_PX, blur_planes, gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, root_only
-from airborne.tracking.model_based.kernel_arguments import Comparison, Paint, Projection, Window
+from airborne.tracking.model_based.kernel_arguments import Comparison, Projection, Window
 from airborne.tracking.model_based.normal_equations import (
     MASK,
     equations_of_known_light,
@@ -102,7 +102,7 @@ class SingleView:
         render_model, certainty = self._render_model, np.ones(self._region.rgb.shape[:2], np.float32)
         body, projection, comparison, maps = self._common(pose, clip)
         observation = prepare_rows(self._observed, self._background, certainty, comparison)
-        paint = Paint(render_model.albedo, render_model.is_faceted)
+        paint = render_model.paint
         sums, blocks = Sums.zero(len(render_model.model.segments)), self._blocks()
         _, total, _ = photometric_equations(
             body, projection, observation, comparison, maps, paint, self._light, iterations, sums, blocks
@@ -120,7 +120,7 @@ class SingleView:
     def cost(self, view, comparison, pose):
         """The robust squared residual of a view or a part of it, less that of the empty scene."""
         render_model, n = self._render_model, len(self._render_model.model.segments)
-        paint, blocks = Paint(render_model.albedo, render_model.is_faceted), new_blocks(view.whole.x1, view.whole.y1, n)
+        paint, blocks = render_model.paint, new_blocks(view.whole.x1, view.whole.y1, n)
         args = render_model.body, view.projection(self.with_pose(pose)), view.observation, comparison, view.maps
         return photometric_equations(*args, paint, view.light, 0, Sums.zero(n), blocks)[0]
 
@@ -131,7 +131,7 @@ class SingleView:
         """
         view, comparison = self.view()
         posed, n = self.with_pose(pose), len(self._render_model.model.segments)
-        paint = Paint(self._render_model.albedo, self._render_model.is_faceted)
+        paint = self._render_model.paint
         even = pack_lights(FLAT, self._region.camera), np.float32(FLAT.ambient)
         args = self._render_model.body, view.projection(posed), view.observation, comparison
         rises, costs = np.zeros((2, n)), np.empty((2, n + 1))
@@ -143,7 +143,7 @@ class SingleView:
             args = args[0], view.projection(posed)._replace(t=t), *args[2:4], view.maps
             sums = Sums.zero(n), self._blocks()
             costs[0, absent] = photometric_equations(*args, paint, view.light, 0, *sums)[0]
-            costs[1, absent] = equations_of_known_light(*args, paint.is_faceted, *even, *sums)[0]
+            costs[1, absent] = equations_of_known_light(*args, paint, *even, *sums)[0]
         return rises, costs[:, :-1] - costs[:, -1:]
 
     def silhouette(self, pose):

@@ -59,7 +59,15 @@ class RunFit(NamedTuple):
     evidence: Sequence[ImageEvidence]
 
 
-def fit_run(model: BodyModel, poses: Sequence[Pose], time_s: Array, stretches: Sequence[Stretch], look: Look) -> RunFit:
+def fit_run(
+    model: BodyModel,
+    poses: Sequence[Pose],
+    time_s: Array,
+    stretches: Sequence[Stretch],
+    look: Look,
+    *,
+    n_steps: int = N_STEPS,
+) -> RunFit:
     """Fit the poses at the times (n,) [s], which are near already; outside of stretches they stay.
 
     The last step is not looked at any more.
@@ -69,7 +77,7 @@ def fit_run(model: BodyModel, poses: Sequence[Pose], time_s: Array, stretches: S
         return _Iterate(model, poses, time_s, stretches, look(poses))
 
     rule = BacktrackingRule(_SHORTER, _LEAST_SHARE)
-    descent = descend(evaluate(poses), evaluate, rule, most_steps=N_STEPS - 1, slack=_SLACK)
+    descent = descend(evaluate(poses), evaluate, rule, most_steps=n_steps - 1, slack=_SLACK)
     best = descent.best
     return RunFit(best.poses if descent.n_losses else best.step(1.0)[0], best.evidence)
 

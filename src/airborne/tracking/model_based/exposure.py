@@ -19,7 +19,6 @@ from airborne.body.chain import delta_between, move_pose
 from airborne.tracking.image_regions import bounding_points
 from airborne.tracking.model_based.gauss_newton import Fit, fit_images
 from airborne.tracking.model_based.image_views import ImageView
-from airborne.tracking.model_based.kernel_arguments import Paint
 from airborne.tracking.model_based.normal_equations import light_by_lamps, light_fitted
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.types import Array
@@ -98,8 +97,7 @@ def _composite_change(render_model: RenderModel, body: PosedBody, view: ViewBuff
     """Return the composite less the background: (3, h, w), in the light that was fitted or is known."""
     args = render_model.body, view.projection(body)
     if render_model.lights is None:
-        paint = Paint(render_model.albedo, render_model.is_faceted)
-        lit = light_fitted(*args, view.maps, paint, view.light)
+        lit = light_fitted(*args, view.maps, render_model.paint, view.light)
     else:
         lit = light_by_lamps(*args, view.maps, *view.light)
     change, is_body = np.zeros_like(lit), view.maps.part >= 0

@@ -17,7 +17,7 @@ from airborne.body import Pose, PosedBody
 from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
 from airborne.tracking.model_based.image_views import NOISE_PX, ImageView, image_views
-from airborne.tracking.model_based.kernel_arguments import Comparison, Paint
+from airborne.tracking.model_based.kernel_arguments import Comparison
 from airborne.tracking.model_based.normal_equations import (
     MASK,
     equations_of_known_light,
@@ -229,10 +229,9 @@ def _add_image_equations(
     view = image.buffers
     args = render_model.body, view.projection(posed), view.observation, image.drawn, view.maps
     if render_model.lights is None:
-        paint = Paint(render_model.albedo, render_model.is_faceted)
-        return np.array(photometric_equations(*args, paint, view.light, iterations, sums, blocks))
+        return np.array(photometric_equations(*args, render_model.paint, view.light, iterations, sums, blocks))
     lamps, ambient = view.light
-    return np.array(equations_of_known_light(*args, render_model.is_faceted, lamps, ambient, sums, blocks))
+    return np.array(equations_of_known_light(*args, render_model.paint, lamps, ambient, sums, blocks))
 
 
 def _blocks(view: ViewBuffers, n_segments: int) -> Array:

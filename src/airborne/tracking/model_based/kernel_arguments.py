@@ -27,6 +27,7 @@ class Paint(NamedTuple):
 
     albedo: Any  # (parts, 3) linear light
     is_faceted: Any  # (parts,), see `flatten_shading`
+    cloth: Any  # (parts,) which parts are of one cloth: they are shaded alike
 
 
 class Projection(NamedTuple):

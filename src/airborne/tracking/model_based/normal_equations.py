@@ -20,7 +20,11 @@ from airborne.tracking.model_based.row_equations import add_rows
 from airborne.types import Array
 
 # of one kernel with the images, so that what they share is compiled once
-MASK = Paint(np.zeros((0, 3), np.float32), np.zeros(0, np.bool_)), np.zeros((3, LIGHT_TERMS), np.float32), 0
+MASK = (
+    Paint(np.zeros((0, 3), np.float32), np.zeros(0, np.bool_), np.zeros(0, np.int16)),
+    np.zeros((3, LIGHT_TERMS), np.float32),
+    0,
+)
 
 
 def prepare_rows(observed: Array, background: Array, certainty: Array, comparison: Comparison) -> Observation:
@@ -70,20 +74,21 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
     box, lit = mask_box(maps.part), np.empty((0, 1, 1), np.float32)
     if len(paint.albedo):
         x0, y0, x1, y1 = box
-        fit_light(observation.observed, maps.part, maps.normals, paint.albedo, light, iterations, x0, y0, x1, y1)
+        of_body = maps.part, maps.normals, paint.albedo, paint.cloth
+        fit_light(observation.observed, *of_body, light, iterations, x0, y0, x1, y1)
         lit = np.empty(maps.normals.shape, np.float32)
         shade_body(maps.part, maps.normals, paint.albedo, light, x0, y0, lit[:, y0:y1, x0:x1])
     owner, nearness = _owners(body, len(projection.R), maps, box)
-    flat = _flatten(lit, maps.part, paint.is_faceted, box)
+    flat = _flatten(lit, maps.part, paint, box)
     return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
 @kernel(fastmath=True)
-def equations_of_known_light(body, projection, observation, comparison, maps, is_faceted, lamps, ambient, sums, blocks):
+def equations_of_known_light(body, projection, observation, comparison, maps, paint, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     lit, box = light_by_lamps(body, projection, maps, lamps, ambient), mask_box(maps.part)
     owner, nearness = _owners(body, len(projection.R), maps, box)
-    flat = _flatten(lit, maps.part, is_faceted, box)
+    flat = _flatten(lit, maps.part, paint, box)
     return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
 
@@ -124,15 +129,15 @@ def _owners(body, n_segments, maps, box):
 
 
 @kernel(fastmath=True, is_inner=True)
-def _flatten(lit, part, is_faceted, box):
+def _flatten(lit, part, paint, box):
     """Return the lit body's colours (c, H, W) as they move with it."""
     flat = lit
-    if not is_faceted.all():
+    if not paint.is_faceted.all():
         x0, y0, x1, y1 = box
         flat = np.empty_like(lit)
         for k in range(len(lit)):
             for y in range(y0, y1):
                 for x in range(x0, x1):
                     flat[k, y, x] = lit[k, y, x]
-        flatten_shading(part[y0:y1, x0:x1], is_faceted, flat[:, y0:y1, x0:x1])
+        flatten_shading(part[y0:y1, x0:x1], paint.albedo, paint.is_faceted, paint.cloth, flat[:, y0:y1, x0:x1])
     return flat

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose
@@ -161,10 +162,11 @@ class RefinedTracker:
         misfit: float | None = None,
         *,
         surface: RenderModel | None = None,
+        shown: NDArray[np.bool_] | None = None,
     ) -> ImageEvidence:
-        """Return what the images say about a pose of the body, or of another surface of it; see `image_evidence`."""
+        """Return what the images say about a pose of the body, or of another surface; see `image_evidence`."""
         args = surface or self.render_model, pose, self.reduce_frames(frames), state.appearance
-        return image_evidence(*args, model=self._fitter.model, misfit=misfit)
+        return image_evidence(*args, model=self._fitter.model, misfit=misfit, shown=shown)
 
     def reduce_frames(self, frames: Frames) -> Frames:
         """Reduce the images of a body whose joints move: finer ones show more detail than the model has."""

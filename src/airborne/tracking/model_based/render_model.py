@@ -23,7 +23,14 @@ from airborne.rendering.shapes import new_shapes
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.covariance import SHIFT_SD_PX
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom
-from airborne.tracking.model_based.kernel_arguments import Comparison, Observation, PackedBody, Projection, Window
+from airborne.tracking.model_based.kernel_arguments import (
+    Comparison,
+    Observation,
+    PackedBody,
+    Paint,
+    Projection,
+    Window,
+)
 from airborne.tracking.model_based.normal_equations import prepare_rows
 from airborne.types import Array
 
@@ -40,6 +47,7 @@ class RenderModel:
     segment_of_part: NDArray[np.int16]  # (parts,)
     albedo: NDArray[np.float32]  # (parts, 3) linear light
     is_faceted: NDArray[np.bool_]  # (parts,) they have visible edges between flat sides
+    cloth: NDArray[np.int16]  # (parts,) which parts are of one cloth
     symmetry_axes: dict[int, Array]  # segment -> (k, 3) in its frame: rotations about them change nothing
     lights: Lights | None  # None: unknown, fitted in each view
 
@@ -51,7 +59,12 @@ class RenderModel:
         owners = [index for index, segment in enumerate(model.segments) for _ in segment.parts]
         is_faceted = np.array([has_flat_sides(part.shape) for part in model.parts])
         shapes, axes = new_shapes(flat), _symmetry_axes(model)
-        return cls(model, flat, shapes, np.array(owners, np.int16), albedo, is_faceted, axes, lights)
+        cloth = np.arange(len(albedo), dtype=np.int16)
+        return cls(model, flat, shapes, np.array(owners, np.int16), albedo, is_faceted, cloth, axes, lights)
+
+    def copy(self) -> RenderModel:
+        """Return the same body with a workspace of its own."""
+        return replace(self, shapes=new_shapes(self.geometry))
 
     def reshape(self, model: BodyModel) -> RenderModel:
         """Prepare the same body in another shape: its colours stay, and its edges between flat sides."""
@@ -62,6 +75,11 @@ class RenderModel:
     def body(self) -> PackedBody:
         """The body as the kernels take it."""
         return PackedBody(self.shapes, self.geometry, self.segment_of_part)
+
+    @property
+    def paint(self) -> Paint:
+        """How the body reflects, as the kernels take it."""
+        return Paint(self.albedo, self.is_faceted, self.cloth)
 
     def with_pose(self, pose: Pose) -> PosedBody:
         """Pose the body; the same as `BodyModel.with_pose`."""

@@ -12,7 +12,6 @@ from airborne.body.chain import delta_between, move_pose
 from airborne.tracking.model_based.absent_segments import absence_costs_in_fitted_light, absence_costs_in_known_light
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.image_views import ImageView
-from airborne.tracking.model_based.kernel_arguments import Paint
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
@@ -99,8 +98,7 @@ def _absence_costs(
     is_asked[segments] = True
     args = render_model.body, view.projection(posed), view.observation, image.drawn
     if render_model.lights is None:
-        paint = Paint(render_model.albedo, render_model.is_faceted)
-        absence_costs_in_fitted_light(*args, paint, view.light, is_asked, rises)
+        absence_costs_in_fitted_light(*args, render_model.paint, view.light, is_asked, rises)
     else:
         absence_costs_in_known_light(*args, *view.light, is_asked, rises)
     return rises
