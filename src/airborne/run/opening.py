@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, takewhile
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from airborne.tracking.methods import FIELD_MODES
 from airborne.trial.cameras import CameraTable
 from airborne.trial.file import Trial
 from airborne.video import (
+    Frames,
     LiveRecording,
     Recording,
     VideoFacts,
@@ -31,6 +32,7 @@ from airborne.video import (
     open_recording,
 )
 from airborne.video.containers import ADDRESS
+from airborne.video.outages import is_dark
 
 # shares of the calibration's image, chosen: how far a video may reach beyond it, as one of all of a sensor of which
 # a part was calibrated, and how much of it a video shows at least; one said to be twice as large as it is does not pass
@@ -221,3 +223,20 @@ def past_the_end_error(trial: Trial, recording: Recording | LiveRecording) -> Tr
     n = recording.n_images if isinstance(recording, Recording) else None
     last = f", the last is {n - 1}" if n else ""
     return TrialError(f"{trial.name}: there is no frame {trial.start.frame}{last}; start.frame lies past the end")
+
+
+def dark_start_error(trial: Trial, frames: Iterable[Frames]) -> TrialError | None:
+    """Return the error of a recording whose cameras are all dark in the first of the frames; None where one is not."""
+    dark = [each.index for each in takewhile(_is_dark, frames)]
+    if not dark:
+        return None
+    named = f"frame {dark[0]} is" if len(dark) == 1 else f"frames {dark[0]} to {dark[-1]} are"
+    return TrialError(
+        f"{trial.name}: {named} dark in all cameras, so nothing can be tracked from there; set start.frame to a later "
+        "frame, and the pose in [start] to that of the frame"
+    )
+
+
+def _is_dark(frames: Frames) -> bool:
+    views = [view for view in frames.views if view is not None]
+    return bool(views) and all(map(is_dark, views))
