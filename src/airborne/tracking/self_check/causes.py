@@ -74,7 +74,11 @@ def name_causes(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior
     for _ in range(_MOST_CAUSES):
         known = [cause for cause, _ in named]
         scores = _evidence(solution, [n for n in nuisances if n not in known], prior)
-        clear = {n: score for n, score in scores.items() if score > _LEAST_EVIDENCE and _is_clear(solution, n, prior)}
+        clear = {
+            n: score
+            for n, score in scores.items()
+            if (score > _LEAST_EVIDENCE and _is_clear(solution, n, widen(prior, n))) or _is_clear(solution, n, prior)
+        }
         if not clear:
             break
         best = max(clear, key=lambda n: clear[n])
@@ -114,7 +118,7 @@ def _log_likelihood(solution: NuisanceSolution, prior: Array) -> float:
 
 
 def _is_clear(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> bool:
-    value, sd = _size(solution, nuisance, widen(prior, nuisance))
+    value, sd = _size(solution, nuisance, prior)
     return abs(value) > _ALARM_SDS * sd
 
 
