@@ -18,6 +18,7 @@ from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregr
 from airborne.run.opening import (
     Opened,
     dark_start_error,
+    has_fewer_seconds_by_rate,
     open_trial,
     past_the_end_error,
     read_or_calibrate,
@@ -113,7 +114,8 @@ def _note_lengths(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) ->
     if any(camera.offset_s for camera in trial.camera) or (first_s := durations.get(first)) is None:
         return
     for name, duration_s in durations.items():
-        if duration_s is not None and first_s - duration_s > _UNEQUAL * first_s:
+        is_fast = has_fewer_seconds_by_rate(facts[name], facts[first])  # which is noted as such
+        if duration_s is not None and first_s - duration_s > _UNEQUAL * first_s and not is_fast:
             checks.add(
                 f"note: the video of {name} is {float(first_s - duration_s):.2f} s shorter than that of {first}: if it "
                 "began later, `airborne sync` finds by how much"
