@@ -28,4 +28,6 @@ def test_distances_are_said_to_be_as_right_as_the_size_in_the_file(motion, measu
     run = Motion.collect(track(scene, indices))
     found = check_run(run, CROSS, Rig(scene.cameras), kept, is_preset=False)
     (said,) = [doubt for doubt in found.doubts if "only a free fall shows" in doubt]
+    is_measured = not any("a wrong frame rate would not be noticed" in doubt for doubt in found.doubts)
+    assert is_measured == (motion is thrown)
     assert measured in said and "distances are as right as the sizes in the body's file" in said

@@ -32,6 +32,7 @@ _SIZE_OF_ONE_VIEW = (
     "self-check: to one camera only a free fall shows how large a body is, {measured}: distances are as right as the "
     "sizes in the body's file"
 )
+_NO_FALL = "self-check: no free fall was measured, so that a wrong frame rate would not be noticed"
 _NEVER_EMPTY = "self-check: the scene is never seen without the body, so nothing can be said; film a moment without it"
 
 
@@ -92,10 +93,13 @@ def check_run(
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
         of_flight = find_wrong_flight(*flight)
         wrong += [each for each in (of_path, of_flight) if each is not None]
+        is_measured = of_flight is not None or fall(*flight) is not None
         if of_flight is None and len(rig) == 1 and found is not None:
-            is_measured, sd = fall(*flight) is not None, np.sqrt(found.diagnosis.covariance[0, 0])
+            sd = np.sqrt(found.diagnosis.covariance[0, 0])
             measured = f"here to {100 * sd:.1f} %" if is_measured else "and none was measured"
             sentences.append(_SIZE_OF_ONE_VIEW.format(measured=measured))
+        if not is_measured and len(motion) > 1:
+            sentences.append(_NO_FALL)
         if of_path is not None and of_path.kind == "repeated":
             reasons = {**reasons, "pictures show the moment of the one before": np.ones(len(rows), bool)}
     if found is None and len(motion) > 1:
