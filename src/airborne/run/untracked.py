@@ -24,8 +24,8 @@ from airborne.video.decoding import FieldOrder
 # chosen: of so many first frames most must be tracked. Of the example with exchanged or mirrored videos that is each of
 # the first frames, and none as they are
 _N_FRAMES = 5
-# chosen on three synthetic throws: first fields that are tracked in the other order, too; and share of the path's bends
-# that is left then, as 2.7 to 3.6 % were
+# chosen, and looked at on four synthetic throws: first fields that are tracked in the other order, too; share of the
+# path's bends that is left then, as 2.5 to 3.6 % were
 _N_FIELDS, _SMOOTHER = 16, 0.25
 _OTHER_ORDER: Mapping[FieldOrder, FieldOrder] = {
     "progressive": "progressive",

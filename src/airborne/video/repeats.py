@@ -14,7 +14,7 @@ from airborne.video.pixels import plane_rows
 
 _EVERY_PX = 4  # of a picture's rows and columns that are compared
 _PERCENTILE = 99.8  # of the changes of its samples: a body covers a hundredth of a picture or less
-# chosen on five synthetic throws and somersaults, as they are and with one picture repeated: from one picture to the
+# chosen, and looked at on six synthetic throws and somersaults, in one with a picture repeated: from one picture to the
 # next the body changes its samples by 18 to 118 grey levels, a repeated and compressed one by up to 1
 _LEAST_GREY, _STILL = 16.0, 0.25  # change by which something moves; and share of that beside which is none
 _FEWEST, _MOST_CHANGED = 10, 0.1  # chosen: pictures of a still video at least; share of them that compression changes
