@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from airborne.run.opening import fewer_images
+from airborne.run.opening import fewer_images, has_fewer_seconds_by_rate, other_rates
 from airborne.video import VideoFacts
 
 NAMES = ("a", "b", "c")
@@ -24,3 +24,13 @@ def test_a_video_with_a_part_of_the_images_is_named(n_images, share, rate):
 def test_of_other_lengths_and_of_other_rates_nothing_is_said(n_images):
     assert fewer_images(NAMES, [facts(73), facts(n_images), facts(73)]) == []
     assert fewer_images(NAMES, [facts(72), facts(36, 30), facts(72)]) == []
+
+
+def test_a_video_at_another_rate_than_most_is_named_and_whether_that_must_be_wrong():
+    (same,) = other_rates(NAMES, [facts(34, 50), facts(34, 60), facts(34, 50)])
+    assert same.startswith("b: 60 images/s are stated, of other cameras 50") and "its rate is wrong" in same
+    (mixed,) = other_rates(NAMES, [facts(50, 50), facts(60, 60), facts(50, 50)])
+    assert mixed.startswith("b: 60 images/s are stated") and "its rate is wrong" not in mixed
+    assert other_rates(NAMES, [facts(60, 60), facts(60, Fraction(60000, 1001)), facts(60, 60)]) == []
+    assert has_fewer_seconds_by_rate(facts(34, 60), facts(34, 50))
+    assert not has_fewer_seconds_by_rate(facts(30, 50), facts(34, 50))

@@ -2,6 +2,7 @@
 
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from airborne.run import untracked
 from airborne.run.mix_ups import MixUp, _silhouette, possible_mix_ups, undecided_mix_ups
 from airborne.run.untracked import explain_untracked
 from airborne.tracking.methods import Settings
+from airborne.video import VideoFacts
 from tests.support.scenes import CAMERAS, CROSS, Scene
 
 SCENE = Scene(cameras=CAMERAS[:3])
@@ -31,6 +33,7 @@ class Played:
 
     mix_up: MixUp | None
     rig: Rig = RIG
+    facts: tuple[VideoFacts, ...] = ()
 
     def __iter__(self):
         frames = (SCENE.frames(index) for index in range(6))
@@ -53,6 +56,28 @@ def test_of_a_wrong_start_it_is_said_what_was_tried():
         "with videos exchanged or mirrored, nor with one camera left out, nor with another size of the body: are "
         "[start], the body and the calibration right?"
     )
+
+
+@dataclass
+class OfFields:
+    """A recording of the scene by fields, the upper ones of which are first."""
+
+    facts: tuple[VideoFacts, ...]
+    events: list[str]
+    rig: Rig = RIG
+
+    def __iter__(self):
+        is_wrong = self.facts[0].fields == "bottom-first"
+        for index in range(16):
+            yield replace(SCENE.frames(index), views=SCENE.frames(index ^ 1 if is_wrong else index).views)
+
+
+@pytest.mark.parametrize("fields", ["top-first", "bottom-first"])
+def test_fields_in_the_wrong_order_are_named(fields):
+    facts = VideoFacts((160, 120), Fraction(25), None, "progressive", fields, 0)
+    why = explain_untracked(Settings(), CROSS, SCENE.start(), OfFields((facts,) * 3, []))
+    assert ("fields of each picture in the other order" in why.sentence) == (fields == "bottom-first")
+    assert why.is_mix_up == (fields == "bottom-first")
 
 
 def test_a_camera_that_was_moved_is_named():

@@ -9,6 +9,7 @@ from airborne.motion import Motion
 from airborne.run.wrong_colours import wrong_colours
 from airborne.tracking import Estimate, Status
 from tests.support.people import HUMAN, person
+from tests.support.scenes import CROSS, Scene
 
 SCENE = person()
 COLOURS = np.array([part.colour for part in HUMAN.parts])
@@ -42,3 +43,14 @@ def test_other_colours_are_named_where_frames_are_tracked(colours):
 def test_colours_that_are_not_known_yet_say_nothing():
     first = replace(HUMAN.segments[0], parts=tuple(replace(part, colour=None) for part in HUMAN.segments[0].parts))
     assert wrong_colours(replace(HUMAN, segments=(first, *HUMAN.segments[1:])), run_of(), FRAMES) == []
+
+
+def test_a_thing_with_the_colours_of_another_is_named():
+    scene = Scene()
+    frames = [scene.frames(index) for index in (0, 4)]
+    posed = {"status": Status.TRACKED, "covariance": np.eye(6) * 1e-5, "score": 5.0, "n_views": 4}
+    seen = [Estimate(index=f.index, time_s=f.time_s, pose=scene.start(f.index), **posed) for f in frames]
+    own = np.array([part.colour for part in CROSS.parts])
+    assert wrong_colours(CROSS, Motion.collect(seen), frames) == []
+    (sentence,) = wrong_colours(CROSS.with_colours(own[:, ::-1]), Motion.collect(seen), frames)
+    assert "red and blue exchanged" in sentence and "fit-body" not in sentence

@@ -63,6 +63,33 @@ def test_an_avi_that_counts_time_finely_has_the_rate_of_its_pictures(tmp_path, s
     assert [picture.time_s for picture in seen] == [Fraction(k, rate) for k in range(8)]
 
 
+@pytest.mark.parametrize("missing", [(5, 9), (2,), (3, 4, 5, 6)])
+@pytest.mark.parametrize("rate", [Fraction(25), Fraction(30000, 1001)])
+def test_pictures_that_are_missing_change_neither_the_rate_nor_the_times_of_fields(tmp_path, missing, rate):
+    shown = [k for k in range(17) if k not in missing]
+    path = write_clip(
+        *(tmp_path / "a.mp4", numbered(len(shown))),
+        **{"rate": rate, "codec": "libx264", "pix_fmt": "yuv420p", "stamps": shown, "time_base": 1 / rate},
+    )
+    source = VideoSource("cam1", path, "top-first")
+    facts = inspect(source)
+    assert facts.frame_rate == rate
+    assert [field.time_s for field in decode(source, facts)] == [
+        (k + j / Fraction(2)) / rate for k in shown for j in (0, 1)
+    ]
+
+
+def test_pictures_at_uneven_steps_have_their_mean_rate(tmp_path):
+    stamps = [0, 3000, 6100, 9000, 15200, 18000]
+    path = write_clip(
+        *(tmp_path / "a.mp4", numbered(6)),
+        **{"rate": Fraction(30), "codec": "libx264", "pix_fmt": "yuv420p", "stamps": stamps},
+        time_base=Fraction(1, 90000),
+    )
+    assert read(path)[0].frame_rate == pytest.approx(6 * 90000 / 21000, rel=0.2)
+    assert read(path)[0].frame_rate != 30
+
+
 @pytest.mark.parametrize("name", ["a.mkv", "a.ts"])
 def test_times_start_at_the_first_image(tmp_path, name):
     codec = "libx264" if name.endswith("ts") else "ffv1"

@@ -49,7 +49,10 @@ def player_notes(player: Mapping[str, Any], n: int) -> Iterator[str]:
         )
     n_posed = player["n_tracked"] + player["n_uncertain"]
     if not player["n_tracked"]:
-        yield "no frame was tracked, so none of these numbers can be relied on"
+        yield (
+            "no frame was tracked, so none of these numbers can be relied on: are the joints of [[start.player]] those "
+            "of the frame of [start]? `airborne track --first-frame` draws them there"
+        )
     if min(player["n_below_two_cameras"] - player["n_lost"], player["n_fewer_cameras"]) > n_posed / 2:
         yield (
             "in most frames fewer than two cameras agree: are videos exchanged, clocks off (`airborne sync`), or is "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,15 @@ from airborne.run.find import require_two_cameras
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds, undecided_mix_ups
-from airborne.run.opening import Opened, open_trial, past_the_end_error, read_or_calibrate, video_source
+from airborne.run.opening import (
+    Opened,
+    dark_start_error,
+    has_fewer_seconds_by_rate,
+    open_trial,
+    past_the_end_error,
+    read_or_calibrate,
+    video_source,
+)
 from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
@@ -108,7 +117,8 @@ def _note_lengths(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) ->
     if any(camera.offset_s for camera in trial.camera) or (first_s := durations.get(first)) is None:
         return
     for name, duration_s in durations.items():
-        if duration_s is not None and first_s - duration_s > _UNEQUAL * first_s:
+        is_fast = has_fewer_seconds_by_rate(facts[name], facts[first])  # which is noted as such
+        if duration_s is not None and first_s - duration_s > _UNEQUAL * first_s and not is_fast:
             checks.add(
                 f"note: the video of {name} is {float(first_s - duration_s):.2f} s shorter than that of {first}: if it "
                 "began later, `airborne sync` finds by how much"
@@ -149,6 +159,10 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
     if recording.n_frames == 0:
         checks.mistakes.append(str(past_the_end_error(trial, recording)))
         return
+    with closing(iter(recording)) as frames:
+        if error := dark_start_error(trial, frames):
+            checks.mistakes.append(str(error))
+            return
     for mask in trial.mask:
         if recording.n_images is not None and mask.first >= recording.n_images:
             checks.add(f"note: [[mask]] of {mask.camera} begins at frame {mask.first}, after the recording's end")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, takewhile
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from airborne.tracking.methods import FIELD_MODES
 from airborne.trial.cameras import CameraTable
 from airborne.trial.file import Trial
 from airborne.video import (
+    Frames,
     LiveRecording,
     Recording,
     VideoFacts,
@@ -31,12 +32,14 @@ from airborne.video import (
     open_recording,
 )
 from airborne.video.containers import ADDRESS
+from airborne.video.outages import is_dark
 
 # shares of the calibration's image, chosen: how far a video may reach beyond it, as one of all of a sensor of which
 # a part was calibrated, and how much of it a video shows at least; one said to be twice as large as it is does not pass
 _BEYOND, _LEAST_SHARE = 0.5, 0.1
 
 _SHARES = (2, 3, 4)  # chosen: of images that are left out evenly: every second, two of three, three of four
+_OTHER_RATE = 0.005  # chosen: of the usual rate; 59.94 and 60 images a second differ by a thousandth
 _FEWEST_IMAGES = 10  # chosen: of a video whose length says something
 
 AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)
@@ -85,7 +88,8 @@ def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opene
         stop=trial.track.stop,
         lazy=fields_as == "rows",
     )
-    recording.events.extend([*cameras.notes, *fewer_images(recording.rig.names, cameras.facts)])
+    videos = recording.rig.names, cameras.facts
+    recording.events.extend([*cameras.notes, *fewer_images(*videos), *other_rates(*videos)])
     n, stop = recording.n_images, trial.track.stop
     if n is not None and stop is not None and stop > n:
         recording.events.append(f"track.stop = {stop} lies past the end: the last frame is {n - 1}")
@@ -111,6 +115,31 @@ def fewer_images(names: Sequence[str], facts: Sequence[VideoFacts]) -> list[str]
                 f"{true:.5g} a second, and all but its first are shown too early; write it anew with the rate it has"
             )
     return notes
+
+
+def other_rates(names: Sequence[str], facts: Sequence[VideoFacts]) -> list[str]:
+    """Return, as sentences, which videos state another rate than most, and where that is surely wrong."""
+    usual = sorted(facts, key=lambda each: each.image_rate)[len(facts) // 2]
+    notes = []
+    for name, each in zip(names, facts, strict=True):
+        if abs(each.image_rate / usual.image_rate - 1) <= _OTHER_RATE:
+            continue
+        has_same = _n_pictures(each) is not None and _n_pictures(each) == _n_pictures(usual)
+        notes.append(
+            f"{name}: {float(each.image_rate):.5g} images/s are stated, of other cameras {float(usual.image_rate):.5g}"
+            + (", and it has as many images as they: its rate is wrong, unless it ended earlier" if has_same else "")
+            + "; if it was filmed at their rate, write the video anew with that"
+        )
+    return notes
+
+
+def has_fewer_seconds_by_rate(facts: VideoFacts, usual: VideoFacts) -> bool:
+    """Whether a video lasts less than another of as many pictures, as by a wrong rate."""
+    return facts.image_rate > usual.image_rate and _n_pictures(facts) == _n_pictures(usual)
+
+
+def _n_pictures(facts: VideoFacts) -> int | None:
+    return None if facts.duration_s is None else round(facts.duration_s * facts.frame_rate)
 
 
 @contextmanager
@@ -221,3 +250,20 @@ def past_the_end_error(trial: Trial, recording: Recording | LiveRecording) -> Tr
     n = recording.n_images if isinstance(recording, Recording) else None
     last = f", the last is {n - 1}" if n else ""
     return TrialError(f"{trial.name}: there is no frame {trial.start.frame}{last}; start.frame lies past the end")
+
+
+def dark_start_error(trial: Trial, frames: Iterable[Frames]) -> TrialError | None:
+    """Return the error of a recording whose cameras are all dark in the first of the frames; None where one is not."""
+    dark = [each.index for each in takewhile(_is_dark, frames)]
+    if not dark:
+        return None
+    named = f"frame {dark[0]} is" if len(dark) == 1 else f"frames {dark[0]} to {dark[-1]} are"
+    return TrialError(
+        f"{trial.name}: {named} dark in all cameras, so nothing can be tracked from there; set start.frame to a later "
+        "frame, and the pose in [start] to that of the frame"
+    )
+
+
+def _is_dark(frames: Frames) -> bool:
+    views = [view for view in frames.views if view is not None]
+    return bool(views) and all(map(is_dark, views))

@@ -18,6 +18,7 @@ from airborne.motion.jumps.heights import LEAST_RATE_HZ, describe_slow_falls, me
 from airborne.motion.jumps.table import jump_row, write_jumps
 from airborne.motion.players_doubts import describe_player_doubts
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
+from airborne.motion.untracked_players import has_untracked_player, revise_players, without_untracked
 from airborne.run.opening import Opened
 from airborne.run.players_cameras import CameraCheck
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
@@ -102,8 +103,9 @@ class PlayersRun:
             yield observed, step
 
     def writer(self, folder: Path, *, resume: bool) -> PlayersWriter:
-        """Return what writes the estimates; rows that are there already stay."""
-        return PlayersWriter(folder / self.table, self.players.joints, resume=resume)
+        """Return what writes the estimates; rows that are there already stay, but not where they may be revised."""
+        path = folder / self.table
+        return PlayersWriter(path, self.players.joints, resume=resume and not has_untracked_player(path))
 
     def write(self, writer: PlayersWriter, estimate: PlayersStep) -> None:
         """Write one time's estimates; what there is to say of them becomes an event of the recording."""
@@ -134,12 +136,15 @@ class PlayersRun:
         self, folder: Path, drawn: OverlaysAs | None, progress_of: Callable[[str], Progress | None]
     ) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
-        motion = read_players(folder / self.table)
+        tracked = read_players(folder / self.table)
+        motion = without_untracked(tracked)
+        if not np.array_equal(motion.joint_status, tracked.joint_status):
+            revise_players(folder / self.table, motion)
         write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)
         jumps = measure_jumps(motion)
         self.recording.events.extend(describe_slow_falls(motion))
         write_jumps(folder / JUMPS, jumps)
-        return motion, {**self._summary(motion), "jumps": [jump_row(jump) for jump in jumps]}
+        return motion, {**self._summary(tracked), "jumps": [jump_row(jump) for jump in jumps]}
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: PlayersMotion) -> None:
         """Write the report."""

@@ -19,7 +19,7 @@ from airborne.tracking.model_based.status import UNCERTAIN_SD_M
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
 from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong_flight
 from airborne.tracking.self_check.kept_frames import KeptFrames
-from airborne.tracking.self_check.nuisances import MEASURED_SD, PRESET_SD
+from airborne.tracking.self_check.nuisances import MEASURED_SD, ONE_CAMERA_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.tracking.self_check.roughness import PathFinding, find_wrong_path, roughness
 from airborne.types import Array
@@ -31,10 +31,11 @@ _REMEDIES = {  # by the kind of a finding that is an alarm
     "time_s": ": run `airborne sync`, then track again",
     "drift_s": "; write it anew with the rate at which it was filmed, then track again",
 }
-_UNKNOWN_SIZE = (
-    "self-check: to one camera only a free fall shows how large a body is, and none was measured: "
-    "distances are as right as the sizes in the body's file"
+_SIZE_OF_ONE_VIEW = (
+    "self-check: to one camera only a free fall shows how large a body is, {measured}: distances are as right as the "
+    "sizes in the body's file"
 )
+_NO_FALL = "self-check: no free fall was measured, so that a wrong frame rate would not be noticed"
 _NEVER_EMPTY = "self-check: the scene is never seen without the body, so nothing can be said; film a moment without it"
 
 
@@ -78,7 +79,8 @@ def check_run(
     excess[rows] = _excess(path.covariance, rough)
     of_path = None if model.has_joints else find_wrong_path(path, rough)
     path = replace(path, covariance=path.covariance + excess[rows])
-    body_sd = PRESET_SD if is_preset else MEASURED_SD
+    is_of_one_view = len(rig) == 1 and not model.has_joints
+    body_sd = ONE_CAMERA_SD if is_of_one_view else PRESET_SD if is_preset else MEASURED_SD
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
     status, doubted, sentences = motion.status.astype(object), motion.doubts.astype(object), []
@@ -94,8 +96,13 @@ def check_run(
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
         of_flight = find_wrong_flight(*flight)
         wrong += [each for each in (of_path, of_flight) if each is not None]
-        if of_flight is None and len(rig) == 1 and found is not None and fall(*flight) is None:
-            sentences.append(_UNKNOWN_SIZE)
+        is_measured = of_flight is not None or fall(*flight) is not None
+        if of_flight is None and len(rig) == 1 and found is not None:
+            sd = np.sqrt(found.diagnosis.covariance[0, 0])
+            measured = f"here to {100 * sd:.1f} %" if is_measured else "and none was measured"
+            sentences.append(_SIZE_OF_ONE_VIEW.format(measured=measured))
+        if not is_measured and len(motion) > 1:
+            sentences.append(_NO_FALL)
         if of_path is not None and of_path.kind == "repeated":
             reasons = {**reasons, "pictures show the moment of the one before": np.ones(len(rows), bool)}
     if found is None and len(motion) > 1:

@@ -30,7 +30,7 @@ from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
 from airborne.run.folder import is_finished, list_tables, prepare_folder, recorded_take, run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
-from airborne.run.opening import Opened, open_live, open_trial, past_the_end_error
+from airborne.run.opening import Opened, dark_start_error, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
 from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import compile_kernels
@@ -216,6 +216,8 @@ def _track(
         first = next(frames, None)
         if first is None:
             raise past_the_end_error(subject.trial, recording)
+        if error := dark_start_error(subject.trial, chain([first], frames)):
+            raise error
         if options.progress is not None:
             options.progress(0, subject.n_frames)  # seeing a person takes seconds
         subject = subject.see(first)

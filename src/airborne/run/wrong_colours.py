@@ -17,16 +17,19 @@ from airborne.video import Frames
 _N_FRAMES = 4  # chosen: of those that a run keeps
 _FEWEST_PX = 20  # chosen: of a part, that say its colour
 # RMS of sRGB values over the body, chosen: of four synthetic people in a hall, darker than their files say, 15 to 21;
-# with their colours in another order or inverted 67 to 99
+# with their colours in another order or inverted 67 to 99; of four synthetic throws 8 to 14, of a blue or green file 92
+# to 144
 _MOST_OFF = 35.0
 _N_NAMED = 3  # parts, chosen
+_OF_PERSON = "is it another person's file, or in other clothes", "Fit it anew (airborne fit-body)"
+_OF_THING = "is it another thing's file, or are red and blue exchanged in the videos", "Correct the file"
 
 
 def wrong_colours(model: BodyModel, motion: Motion, kept: Iterable[Frames]) -> list[str]:
-    """Return, as a sentence, that a jointed body has other colours than images show at tracked poses, up to a light."""
+    """Return, as a sentence, that a body has other colours than images show at tracked poses, up to a light."""
     rows = {int(index): row for row, index in enumerate(motion.index) if motion.status[row] == Status.TRACKED.value}
     shown = islice(((frames, motion.pose(rows[frames.index])) for frames in kept if frames.index in rows), _N_FRAMES)
-    if not model.has_joints or model.needs_colours:
+    if model.needs_colours:
         return []
     seen, weights = _seen_colours(model, shown)
     if not weights.any():
@@ -35,10 +38,11 @@ def wrong_colours(model: BodyModel, motion: Motion, kept: Iterable[Frames]) -> l
     if total <= _MOST_OFF:
         return []
     worst = [model.parts[i].name for i in np.argsort(off * np.sqrt(weights))[::-1][:_N_NAMED]]
+    cause, mend = _OF_PERSON if model.has_joints else _OF_THING
     return [
         f"the body's colours lie {total:.0f} sRGB values (RMS) from those that the images show at its tracked poses, "
-        f"most of all those of {', '.join(worst)}; expected {_MOST_OFF:.0f} at most: is it another person's file, or "
-        'in other clothes? Fit it anew (airborne fit-body), or write colour = "sample" for its parts'
+        f"most of all those of {', '.join(worst)}; expected {_MOST_OFF:.0f} at most: {cause}? "
+        f'{mend}, or write colour = "sample" for its parts'
     ]
 
 

@@ -233,14 +233,22 @@ def _rate(container: InputContainer, stream: VideoStream) -> Fraction | None:
     """Return the rate that a file states [1/s]; None where it states none.
 
     An AVI file states how finely it counts time, which may be finer than its pictures follow one another: then the
-    rate is that of their median step, as its index has it, which lists every picture.
+    rate is that of their median step, as its index has it, which lists every picture. So does the index of an MP4 or
+    QuickTime file, which states the mean rate: where pictures are missing between others at equal steps, theirs counts.
     """
     stated = stream.average_rate or stream.guessed_rate
-    stamps = [entry.timestamp for entry in stream.index_entries] if container.format.name == "avi" else []
+    lists_all = container.format.name == "avi" or "mp4" in container.format.name.split(",")
+    stamps = sorted(entry.timestamp for entry in stream.index_entries) if lists_all else []
     if not stated or not stream.time_base or len(stamps) < _FEWEST_INDEXED:
         return stated
-    step_s = int(median(b - a for a, b in pairwise(stamps))) * stream.time_base
-    return 1 / step_s if step_s * stated >= _FALSE_RATE else stated
+    steps = [b - a for a, b in pairwise(stamps)]
+    step = int(median(steps))
+    if container.format.name == "avi":
+        return 1 / (step * stream.time_base) if step * stream.time_base * stated >= _FALSE_RATE else stated
+    passed = [round(each / step) for each in steps] if step else []  # steps of the recording from picture to picture
+    has_gaps = any(n > 1 for n in passed)
+    is_even = all(n and abs(each - n * step) <= n for n, each in zip(passed, steps, strict=False))
+    return sum(passed) / ((stamps[-1] - stamps[0]) * stream.time_base) if has_gaps and is_even else stated
 
 
 def _exact_rate(rate: Fraction) -> Fraction:

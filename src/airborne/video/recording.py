@@ -16,7 +16,9 @@ from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, decod
 from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
 from airborne.video.lazy import ConversionCache, lazy_view
+from airborne.video.outages import N_LISTED
 from airborne.video.prefetch import read_ahead
+from airborne.video.repeats import PictureChanges
 from airborne.video.sizes import check_sizes
 from airborne.video.undistortion import Undistortion, undistortion_of
 
@@ -123,7 +125,7 @@ class Recording:
     def _decode_on_clock(self, source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
         """Yield a camera's images on the trial's clock, and note every gap and an early end."""
         period_s = 1 / facts.image_rate
-        expected_s = source.trial_time(Fraction(0))
+        expected_s, changes, n_repeated = source.trial_time(Fraction(0)), PictureChanges(), 0
         with closing(read_ahead(decode(source, facts))) as stream:
             for image in stream:
                 time_s = source.trial_time(image.time_s)
@@ -132,13 +134,25 @@ class Recording:
                         f"{source.name}: no image from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
                         "or missing); images after it may carry damage up to the next key frame"
                     )
+                if (repeated_s := changes.add(image)) is not None and (n_repeated := n_repeated + 1) <= N_LISTED:
+                    self._note_repeated(source, repeated_s)
                 yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
+        if changes.is_still:
+            self._note(f"{source.name}: its pictures are all the same: is the video a still one?")
         end_s = source.trial_time(facts.duration_s or Fraction(0))
         if facts.duration_s and expected_s < end_s - period_s / 2:
             self._note(
                 f"{source.name}: the images end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
             )
+
+    def _note_repeated(self, source: VideoSource, file_s: Fraction) -> None:
+        time_s = source.trial_time(file_s)
+        frame = round((time_s - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
+        self._note(
+            f"{source.name}: frame {frame} ({float(time_s):.3f} s) repeats the picture before it: if the camera filmed "
+            "on, its pictures are late from there; take the repeated one out of the video"
+        )
 
     def _note(self, event: str) -> None:
         if event not in self.events:  # a recording may be read twice

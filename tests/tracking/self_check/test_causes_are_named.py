@@ -9,8 +9,16 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.cameras import Rig
+from airborne.tracking.self_check.causes import name_causes
 from airborne.tracking.self_check.check import doubts, gather_equations, self_check
+from airborne.tracking.self_check.nuisances import (
+    ONE_CAMERA_SD,
+    n_parameters,
+    nuisances_of,
+    prior_covariance,
+)
 from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.solution import NuisanceSolution
 from airborne.video import Frames, View
 from tests.support.scenes import CAMERAS, CROSS, FPS, Scene, rigid_body
 
@@ -80,9 +88,9 @@ def checked_alone(factor):
         covariances[-1][:3, :3] += 0.02**2 * np.outer(along, along)
     path = TrackedPath(np.array([each.index for each in frames]), times, poses, np.array(covariances))
     rig = Rig((camera,))
-    run = gather_equations(larger(factor), rig, path, frames, body_sd=0.01)
+    run = gather_equations(larger(factor), rig, path, frames, body_sd=ONE_CAMERA_SD)
     assert run is not None
-    return self_check(run, larger(factor), rig, path)
+    return self_check(run, larger(factor), rig, path), path.positions - camera.centre
 
 
 def turned(degrees):
@@ -169,8 +177,31 @@ def test_a_body_that_really_leaves_is_not_doubtful():
     assert not any(each.any() for each in doubts(CROSS, path, frames, 0, None).values())
 
 
+@pytest.mark.parametrize(("value", "is_named"), [(0.0235, True), (-0.0235, True), (0.01, False)])
+def test_a_size_is_named_where_it_is_larger_than_three_of_its_deviations(value, is_named):
+    """A size measured to 0.4 % that a usual error of 1 % could explain."""
+    none = np.zeros((n_parameters(RIG), n_parameters(RIG)))
+    row = np.eye(len(none))[0]
+    nothing = NuisanceSolution(none, none[0], 0.0)
+    measured = replace(nothing, without=[nothing] * 4).with_row(row, value, 0.004)
+    prior = prior_covariance(RIG, 0.01, is_person=False)
+    first = name_causes(measured, nuisances_of(RIG), prior).findings[0]
+    assert (first.subject, first.kind, first.is_alarm) == ("body", "scale", is_named)
+    assert (abs(first.value) > 3 * first.sd) == is_named
+
+
 @pytest.mark.parametrize("factor", [0.9, 1.0, 1.1])
 def test_of_one_camera_the_fall_tells_the_size_of_the_body(factor):
-    alarms = [finding for finding in checked_alone(factor).diagnosis.findings if finding.is_alarm]
+    alarms = [finding for finding in checked_alone(factor)[0].diagnosis.findings if finding.is_alarm]
     assert [(each.subject, each.kind) for each in alarms] == ([] if factor == 1 else [("body", "scale")])
     assert all(abs(each.value - (1 / factor - 1)) < 2 * each.sd for each in alarms)
+
+
+@pytest.mark.parametrize("factor", [0.9, 0.97, 1.03, 1.1])
+def test_deviations_of_one_cameras_distances_hold_a_wrong_size_named_or_not(factor):
+    """A body that is larger in its file is taken to be as much further away."""
+    found, from_camera = checked_alone(factor)
+    distance = np.linalg.norm(from_camera, axis=1)
+    along = (from_camera / distance[:, None])[found.index]
+    sd = np.sqrt(np.einsum("ni,nij,nj->n", along, found.added[:, :3, :3], along))
+    assert np.all(sd > abs(1 - 1 / factor) * distance[found.index] / 2)

@@ -121,13 +121,23 @@ def test_a_fall_is_measured_across_a_direction_that_one_camera_hardly_sees():
     assert fall(time_s, blurred, R, np.full((25, 3, 3), np.nan)) is None
 
 
-@pytest.mark.parametrize(("rate", "said"), [(25, None), (22, None), (12.5, "2.5 m/s²"), (50, "39.2 m/s²"), (3, None)])
+@pytest.mark.parametrize(
+    ("rate", "said"),
+    [(25, None), (22, None), (12.5, "2.5 m/s²"), (50, "39.2 m/s²"), (6.25, "0.6 m/s²"), (100, "157.0 m/s²"), (3, None)],
+)
 def test_a_fall_that_no_size_explains_tells_of_a_wrong_rate(rate, said):
     found = find_wrong_flight(*thrown(40, rate), known(40))
     assert (found is None) == (said is None)
     if found is not None:
         assert said in found.sentence and f"{rate / 25:.2f} of that" in found.sentence
         assert found.gravity_m_s2 == pytest.approx(9.81 * (rate / 25) ** 2, rel=0.01) and found.to_dict()["is_alarm"]
+
+
+@pytest.mark.parametrize(("n", "is_long"), [(12, False), (14, True)])
+def test_a_fall_counts_by_its_depth_whatever_the_rate(n, is_long):
+    """Of 0.44 and 0.52 s in truth; hands lead a thing on a shorter one."""
+    for rate in (12.5, 50):
+        assert (find_wrong_flight(*thrown(n, rate), known(n)) is not None) == is_long
 
 
 @pytest.mark.parametrize("up", ["x", "y"])

@@ -88,7 +88,11 @@ def name_causes(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior
     for _ in range(_MOST_CAUSES):
         known = [cause for cause, _ in named]
         scores = _evidence(solution, [n for n in nuisances if n not in known], prior)
-        clear = {n: score for n, score in scores.items() if score > _LEAST_EVIDENCE and _is_clear(solution, n, prior)}
+        clear = {
+            n: score
+            for n, score in scores.items()
+            if (score > _LEAST_EVIDENCE and _is_clear(solution, n, widen(prior, n))) or _is_clear(solution, n, prior)
+        }
         if not clear:
             break
         best = max(clear, key=lambda n: clear[n])
@@ -128,9 +132,10 @@ def _find_drift(
     for late in (each for each in nuisances if each.kind == "time_s"):
         drift = Nuisance(late.subject, "drift_s", len(prior), 1)
         grown, padded = solution.with_growth(late.first), np.pad(widen(prior, late), (0, 1))
-        evidence = _log_likelihood(grown, widen(padded, drift)) - nothing
-        if evidence > best and _is_clear(grown, drift, padded):
-            best, found = evidence, (drift, grown, widen(padded, drift))
+        free = widen(padded, drift)
+        evidence = _log_likelihood(grown, free) - nothing
+        if evidence > best and _is_clear(grown, drift, free):
+            best, found = evidence, (drift, grown, free)
     return found
 
 
@@ -148,7 +153,7 @@ def _log_likelihood(solution: NuisanceSolution, prior: Array) -> float:
 
 
 def _is_clear(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> bool:
-    value, sd = _size(solution, nuisance, widen(prior, nuisance))
+    value, sd = _size(solution, nuisance, prior)
     return abs(value) > ALARM_SDS * sd
 
 

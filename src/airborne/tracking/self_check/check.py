@@ -91,9 +91,10 @@ def self_check(run: RunEquations, model: BodyModel, rig: Rig, path: TrackedPath)
         # one camera's place and clock are those of the poses
         causes = [each for each in nuisances_of(rig) if len(rig) > 1 or each.kind in ("scale", "focal")]
         diagnosis = name_causes(run.solution, causes, run.prior)
-    constant = _constant_errors(errors, diagnosis, len(run.prior))
+    shows_place = diagnosis.has_alarm and len(rig) > 1  # one camera's silhouettes do not tell how far away a body is
+    constant = _constant_errors(errors, diagnosis, len(run.prior), shows_place=shows_place)
     if model.has_joints:  # the covariances of its frames hold that its shape is wrong
-        added = _constant_errors(errors, diagnosis, first_bias(rig))
+        added = _constant_errors(errors, diagnosis, first_bias(rig), shows_place=shows_place)
     else:
         K = errors.by_parameter
         added = _positive(constant - K @ shift_covariance(rig) @ np.swapaxes(K, 1, 2))
@@ -105,10 +106,13 @@ def self_check(run: RunEquations, model: BodyModel, rig: Rig, path: TrackedPath)
     return SelfCheck(diagnosis, path.index[rows], constant, added, elsewhere)
 
 
-def _constant_errors(errors: PoseErrors, diagnosis: Diagnosis, n: int) -> Array:
-    """Return the covariance (m, 6, 6) of the pose's errors by the first n parameters."""
+def _constant_errors(errors: PoseErrors, diagnosis: Diagnosis, n: int, *, shows_place: bool) -> Array:
+    """Return the covariance (m, 6, 6) of the pose's errors by the first n parameters.
+
+    shows_place: their mean is what the silhouettes show, not what the parameters say.
+    """
     K = errors.by_parameter[:, :, :n]
-    mean = errors.at(diagnosis.theta) if diagnosis.has_alarm else K @ diagnosis.theta[:n]
+    mean = errors.at(diagnosis.theta) if shows_place else K @ diagnosis.theta[:n]
     return K @ diagnosis.covariance[:n, :n] @ np.swapaxes(K, 1, 2) + mean[:, :, None] * mean[:, None, :]
 
 

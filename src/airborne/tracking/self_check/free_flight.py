@@ -15,9 +15,11 @@ _MOST_RMS_M = 0.008  # about the parabola: more is no free flight, or not of the
 _LEAST_NOISE_M = 0.001  # chosen on three synthetic throws seen by one camera: noise beside the stated deviation
 _MOST_TILT = 0.15  # horizontal acceleration, as a share of the vertical one
 _LEAST_M_S2, _MOST_M_S2 = 6.0, 15.0  # a fall that a wrong scale can explain
-# chosen: a fall that a wrong frame rate explains, half and twice the right one, and its least length, as hands
-# lead a thing on a short parabola, too
-_SLOWEST_M_S2, _FASTEST_M_S2, _LONG_S = 2.0, 45.0, 0.5
+# chosen: a fall that a wrong frame rate explains, a fifth to five times the right one
+_SLOWEST_M_S2, _FASTEST_M_S2 = GRAVITY_M_S2 / 5**2, GRAVITY_M_S2 * 5**2
+# chosen: of a long fall, as hands lead a thing on a short parabola, too: how far the path departs from its chord, as in
+# free fall of 0.5 s; no wrong frame rate changes it
+_LONG_M = GRAVITY_M_S2 * 0.5**2 / 8
 _MOST_OFF = 0.1  # chosen: from gravity's size, of a fall in a wrong direction; a hand hardly leads a thing so
 _LEAST_SD_M_S2 = 0.03  # air, and a centre of mass that is not quite where it is taken to be
 
@@ -67,8 +69,8 @@ def find_wrong_flight(time_s: Array, position: Array, R: Array, covariance: Arra
 
     The arrays are those of `fall`. Short flights do not count.
     """
-    found = _parabola(time_s, position, R, covariance) if len(time_s) and np.ptp(time_s) >= _LONG_S else None
-    if found is None:
+    found = _parabola(time_s, position, R, covariance)
+    if found is None or np.linalg.norm(found.acceleration) * np.ptp(time_s) ** 2 / 8 < _LONG_M:
         return None
     if not found.is_vertical:
         return _wrong_vertical(found)
