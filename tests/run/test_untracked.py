@@ -90,6 +90,15 @@ def test_mix_ups_that_what_stands_out_speaks_against_are_not_tried():
     assert MixUp((0, 1)) in undecided_mix_ups(RIG, exchanged, CROSS, SCENE.start())
 
 
+def test_an_exchange_is_tried_where_each_image_agrees_with_both_silhouettes():
+    seen = [_silhouette(CROSS, SCENE.start(), camera) for camera in RIG]
+    is_in = np.indices(seen[0].shape).sum(axis=0) % 4 > 0  # three of four pixels
+    alike = [seen[0] & is_in | seen[1], seen[1] & is_in | seen[0], seen[2]]
+    assert undecided_mix_ups(RIG, alike, CROSS, SCENE.start()) == [MixUp((0, 1))]
+    right = [seen[0] | seen[1] & is_in, seen[1] | seen[0] & is_in, seen[2]]
+    assert undecided_mix_ups(RIG, right, CROSS, SCENE.start()) == []
+
+
 def test_what_is_undone_twice_is_as_before():
     for mix_up in possible_mix_ups(len(NAMES)):
         once = mix_up.undo(SCENE.frames(0))

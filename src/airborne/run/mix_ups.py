@@ -147,7 +147,8 @@ def possible_mix_ups(n_cameras: int) -> list[MixUp]:
 def undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyModel, start: Pose) -> list[MixUp]:
     """Return the mix-ups that what stands out in the cameras at the start does not speak against.
 
-    It does where an image agrees with its own camera's silhouette, or better than as the mix-up would have it.
+    It does where an image agrees with its own camera's silhouette better than as the mix-up would have it. Beside each
+    other, cameras see the body in the same part of the image: there an exchanged one agrees with both silhouettes.
     """
     silhouettes = [_silhouette(model, start, camera) for camera in rig]
     own = _agreements(foregrounds, silhouettes)
@@ -158,9 +159,7 @@ def undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyM
         else:
             images = [_mirror(foregrounds[i]) for i in mix_up.cameras]
         crossed = _agreements(images, [silhouettes[i] for i in mix_up.cameras])
-        return all(
-            own[i] < _LEAST_AGREEMENT and own[i] <= other for i, other in zip(mix_up.cameras, crossed, strict=True)
-        )
+        return all(own[i] <= other for i, other in zip(mix_up.cameras, crossed, strict=True))
 
     return list(filter(is_possible, possible_mix_ups(len(rig))))
 
