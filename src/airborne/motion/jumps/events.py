@@ -285,8 +285,8 @@ def _normalise(log_p: Array) -> Array:
 
 
 def _reject_unseen(track: LegTrack, draws: Array | None) -> Array | None:
-    """Return draws of an event's time; None where they are far apart, or no frame near is seen by two cameras."""
+    """Return draws of an event's time; None where they are far apart, or no frame near has a tracked ankle."""
     if draws is None or float(np.std(draws)) > _MOST_SD_S:
         return None
     is_near = np.abs(track.time_s - draws.mean()) <= _NEAR_S
-    return draws if track.is_measured[is_near].any() else None
+    return draws if track.is_ankle_tracked[is_near].any() else None
