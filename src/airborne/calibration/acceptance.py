@@ -52,14 +52,15 @@ def write_accepted(path: Path, rig: Rig, missed: Errors) -> tuple[Path, tuple[st
     rejected = path.with_name(f"{path.stem}.rejected{path.suffix}")
     reasons = list(_reasons(rig, missed))
     write_pose2sim(rejected, rig, errors_px=missed.rms_px)
-    reasons += [
-        f"{finding.what}: give lengths in metres, and check that names and clicks belong together"
-        for finding in check_baselines(rig)
-    ]
+    if not reasons:  # else what follows follows from them
+        reasons = [
+            f"{finding.what}: give lengths in metres, and check that names and clicks belong together"
+            for finding in check_baselines(rig)
+        ]
     try:
         read_rig(rejected, unit="m")  # its distances are judged already
     except CalibrationError as error:
-        reasons.append(f"the file cannot be read back: {error}")
+        reasons = reasons or [f"the file cannot be read back: {error}"]
     return (rejected, tuple(reasons)) if reasons else (rejected.replace(path), ())
 
 

@@ -153,7 +153,7 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
             "file are enlarged by it; record more poses, slower, in every corner"
         )
     places = [each.name for each in calibration.rig if _place_sd_m(_sds(calibration, each)) > _OPEN_SD_M]
-    if places:
+    if places and calibration.inputs.start_rig is not None:
         sentences.append(
             f"no source shows where {', '.join(places)} stand: their places are those of [start], which were found "
             "with other lenses; add control points, a wand, a court or a board that several cameras see"
