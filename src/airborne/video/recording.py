@@ -15,6 +15,7 @@ from airborne.errors import VideoError
 from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, decode, inspect, rgb_from_decoded
 from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
+from airborne.video.gaps import describe_gaps
 from airborne.video.lazy import ConversionCache, lazy_view
 from airborne.video.prefetch import read_ahead
 from airborne.video.sizes import check_sizes
@@ -42,6 +43,7 @@ class Recording:
     stop: int | None
     is_lazy: bool = False
     events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
+    _gaps: dict[str, dict[Fraction, Fraction]] = field(default_factory=dict)  # of each camera, from -> to [s]
     _known: dict[tuple[str, bool], tuple[Camera, dict[int | None, Undistortion]]] = field(default_factory=dict)
 
     @property
@@ -128,10 +130,7 @@ class Recording:
             for image in stream:
                 time_s = source.trial_time(image.time_s)
                 if time_s > expected_s + period_s / 2:
-                    self._note(
-                        f"{source.name}: no image from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
-                        "or missing); images after it may carry damage up to the next key frame"
-                    )
+                    self._note_gap(source.name, expected_s, time_s)
                 yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
         end_s = source.trial_time(facts.duration_s or Fraction(0))
@@ -139,6 +138,16 @@ class Recording:
             self._note(
                 f"{source.name}: the images end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
             )
+
+    def _note_gap(self, name: str, from_s: Fraction, to_s: Fraction) -> None:
+        """Note a gap in the one line that says all of a camera's."""
+        gaps = self._gaps.setdefault(name, {})
+        before = describe_gaps(name, gaps) if gaps else None
+        gaps[from_s] = to_s
+        if before in self.events:
+            self.events[self.events.index(before)] = describe_gaps(name, gaps)
+        else:
+            self.events.append(describe_gaps(name, gaps))
 
     def _note(self, event: str) -> None:
         if event not in self.events:  # a recording may be read twice
