@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 UNDECIDED, STOPPED = 3, 130  # exit codes of the command line beside 2: of an UndecidedError, of Ctrl-C
 _LONGEST = 1200  # characters of a message
+_OTHER_WORDS = {"end": ("stop",), "last": ("stop",), "first": ("frame",), "step": ("every",), "path": ("file", "video")}
 _MOST_SAID = 5  # mistakes of one file in a line
 
 
@@ -151,7 +152,8 @@ def _describe_place(place: tuple[str, ...], errors: Sequence[ErrorDetails], mode
     if first["type"] == "missing":
         return f"{where} is missing"
     if first["type"] == "extra_forbidden":
-        alike = get_close_matches(place[-1], _list_keys(model, first["loc"]), 1)
+        keys = _list_keys(model, first["loc"])
+        alike = get_close_matches(place[-1], keys, 1) or [key for key in _OTHER_WORDS.get(place[-1], ()) if key in keys]
         if alike:
             return f"{where}: unknown key; did you mean {alike[0]}?"
     said = ", or ".join(dict.fromkeys(map(_phrase, errors)))

@@ -174,3 +174,13 @@ def test_points_of_other_cameras_end_with_exit_code_1_and_another_file(tmp_path,
     assert result.startswith("camera ")
     assert not (tmp_path / "c.toml").exists()
     assert stopped.value.code == 1 and (tmp_path / "c.rejected.toml").exists(), capsys.readouterr().err
+
+
+def test_a_path_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path, monkeypatch):
+    def refuse(path, *_, **__):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr("airborne.calibration.acceptance.write_pose2sim", refuse)
+    with pytest.raises(PermissionError) as caught:
+        write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, GOOD))
+    assert caught.value.filename == str(tmp_path / "calib.toml")

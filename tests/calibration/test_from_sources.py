@@ -63,7 +63,7 @@ def test_left_out_errors_far_beyond_the_fits_bring_a_warning(by_board):
     far = {name: 5 * distances for name, distances in by_board.held_out_px.items()}
     said = describe_calibration(replace(by_board, held_out_px=far))
     assert "warning: what is left out of the fit lies 5" in said
-    assert "those in the calibration file are enlarged by it" in said
+    assert "the standard deviations, here and in the calibration file, are enlarged by it" in said
 
 
 @pytest.fixture(scope="module")

@@ -182,8 +182,10 @@ def test_names_of_left_and_right_exchanged_put_cameras_below_the_floor(hall, tmp
     swapped = text.replace("left", "LEFT").replace("right", "left").replace("LEFT", "right")
     rows = [row for row in swapped.splitlines() if "net" not in row and "antenna" not in row]
     (tmp_path / "court.csv").write_text("\n".join(rows))
-    kinds = {each["kind"] for each in calibration_to_dict(calibrated(tmp_path, COURT))["findings"]}
-    assert "mirrored" in kinds
+    report = calibration_to_dict(calibrated(tmp_path, COURT))
+    kinds = {each["kind"] for each in report["findings"]}
+    assert "mirrored" in kinds and "units" not in kinds
+    assert not any("[start]" in each for each in report["warnings"])
 
 
 def test_a_knocked_camera_is_named_by_the_report(hall, tmp_path):

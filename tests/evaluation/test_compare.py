@@ -162,6 +162,15 @@ def test_description_names_every_axis_and_symmetry_only_where_there_is_one():
     assert "symmetry" in compare_motion(motion, flight(), HALF_TURN).describe()
 
 
+def test_of_rotations_that_are_transposed_it_is_asked():
+    true = flight()
+    known = motion_of(true, covariance=np.diag(np.full(6, 1e-6)))
+    asked = compare_motion(known, replace(true, R=np.swapaxes(true.R, 1, 2)), IDENTITY).describe()
+    assert "hardly any rotation lies within 2 sd" in asked and "transposed" in asked
+    assert "hardly any position" not in asked
+    assert "hardly any" not in compare_motion(known, true, IDENTITY).describe()
+
+
 def test_a_reference_in_millimetres_is_asked_about_in_columns_that_stay_apart():
     true = flight()
     text = compare_motion(motion_of(true), replace(true, position=1e3 * true.position), IDENTITY).describe()

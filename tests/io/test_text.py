@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from airborne.io.text import parse_toml, read_bytes, read_flat_yaml, read_json, read_toml
+from airborne.io.text import parse_toml, read_bytes, read_csv, read_flat_yaml, read_json, read_toml
 
 
 def test_plain_files_are_read(tmp_path):
@@ -87,3 +87,24 @@ def test_what_is_no_file_is_not_read(tmp_path):
             read_bytes(Path(path), 1000)
     if os.path.exists("/proc/kmsg"):
         assert read_bytes(Path("/proc/kmsg"), 1000) == b""  # of 0 bytes, says the system; reading would wait for ever
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ("point;x_m\nü;1,5\n".encode(), "columns are separated by semicolons; save it with commas"),
+        (b"point\tx_m\na\t1.5\n", "columns are separated by tabs; save it with commas"),
+        ("point,x_m\nü,1.5\n".encode("latin-1"), "not a text file in UTF-8; save it as UTF-8"),
+        ("point,x_m\na,1.5\n".encode("utf-16"), "not a text file in UTF-8; save it as UTF-8"),
+        (b"\x89PNG\r\n\x1a\n", "not a text file; expected a table"),
+    ],
+)
+def test_of_a_table_in_another_form_it_is_said_how_to_save_it(tmp_path, data, said):
+    (tmp_path / "a.csv").write_bytes(data)
+    with pytest.raises(ValueError, match=said):
+        read_csv(tmp_path / "a.csv", "expected a table", ValueError)
+
+
+def test_a_cell_may_hold_a_semicolon(tmp_path):
+    (tmp_path / "a.csv").write_text("\ufeffpoint,note\na,b;c\n", encoding="utf-8")
+    assert read_csv(tmp_path / "a.csv", "", ValueError) == [(1, ["point", "note"]), (2, ["a", "b;c"])]

@@ -40,6 +40,13 @@ def test_a_mirrored_video_is_named(i):
     assert kinds(images) == [("mirrored", (NAMES[i],))]
 
 
+@pytest.mark.parametrize("i", [0, 1, 2])
+def test_a_video_upside_down_is_named(i):
+    images = list(IMAGES)
+    images[i] = images[i][::-1, ::-1]
+    assert kinds(images) == [("turned", (NAMES[i],))]
+
+
 def test_where_little_can_be_seen_nothing_is_said():
     still = np.zeros_like(IMAGES[0])
     assert kinds([still, still, still]) == []

@@ -7,6 +7,7 @@ import pytest
 
 from airborne.errors import MistakesError
 from airborne.run.check import check_trial
+from airborne.run.mix_ups import MixUp
 from airborne.run.players_mix_ups import players_mix_up_in
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
@@ -60,6 +61,13 @@ def test_two_exchanged_videos_are_named(start, n, i, j):
 def test_a_mirrored_video_is_named(start, n, i):
     starts, first = start
     assert found(starts, mirror(only(first, n), i)) == ("mirrored", (NAMES[i],))
+
+
+@pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 1), (3, 2), (2, 0), (2, 1)])
+def test_a_video_upside_down_is_named(start, n, i):
+    starts, first = start
+    frames = MixUp((i,), is_turned=True).undo(only(first, n))
+    assert found(starts, frames) == ("turned", (NAMES[i],))
 
 
 def test_a_camera_without_an_image_is_left_out(start):

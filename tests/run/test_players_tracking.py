@@ -270,6 +270,17 @@ def test_live_runs_cannot_be_resumed_and_bodies_cannot_be_live(path, tmp_path, t
     assert "--live is for players" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("status", "code"), [(Status.TRACKED, 0), (Status.UNCERTAIN, 1)])
+def test_a_run_without_a_tracked_frame_exits_with_one(path, tmp_path, monkeypatch, status, code):
+    class Doubtful(StandIn):
+        def step(self, state, frames):
+            state, estimates = super().step(state, frames)
+            return state, tuple(replace(each, joint_status=6 * (status,)) for each in estimates)
+
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Doubtful())
+    assert in_process("track", path, "-o", tmp_path / "run", "--no-pictures") == code
+
+
 def test_a_run_in_which_everybody_is_lost_says_so_and_exits_with_one(path, tmp_path, capsys, monkeypatch):
     class Lost(StandIn):
         def step(self, state, frames):

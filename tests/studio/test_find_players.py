@@ -14,13 +14,14 @@ from tests.support.studio import User, fork_studio, wait_for_frame
 
 
 def test_the_players_of_an_answer_are_those_of_the_trial(rig, folder):  # noqa: F811
-    found = json.loads(json.dumps({"player1": LEGS, "player2": LEGS}))
+    beside = {name: [x + 1.0, y, z] for name, (x, y, z) in LEGS.items()}
+    found = json.loads(json.dumps({"player1": LEGS, "player2": beside}))
     text = with_players(TRIAL + 'body = { preset = "legs" }\n', 2, {k: {"joints_m": v} for k, v in found.items()})
     (folder / "found.toml").write_text(text)
     trial = read_trial(folder / "found.toml")
     assert trial.start.frame == 2 and not trial.start.find
-    for start in player_starts(trial, rig):
-        np.testing.assert_array_equal([start.joints_m[name] for name in LEGS], list(LEGS.values()))
+    for start, legs in zip(player_starts(trial, rig), (LEGS, beside), strict=True):
+        np.testing.assert_array_equal([start.joints_m[name] for name in LEGS], list(legs.values()))
 
 
 def test_legs_are_lines_down_each_side_in_every_camera(rig):  # noqa: F811

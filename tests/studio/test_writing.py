@@ -142,5 +142,7 @@ def test_nothing_is_kept_through_a_link_that_leads_elsewhere(tmp_path, link):
 
 def test_a_file_that_is_no_text_is_one_line(tmp_path):
     (tmp_path / "trial.toml").write_bytes(b"name = '\xff'")
-    with pytest.raises(TrialError, match=r"trial\.toml cannot be read \(it is not a text file\)"):
+    with pytest.raises(
+        TrialError, match=r"trial\.toml cannot be read \(it is not a text file in UTF-8; save it as UTF-8\)"
+    ):
         Editor(tmp_path).write("trial.toml", "x", "edit")

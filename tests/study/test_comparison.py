@@ -161,6 +161,15 @@ def test_a_comparison_leaves_tables_figures_and_a_text(results, tmp_path, capsys
     assert "dry and wet differ, |t| above" in capsys.readouterr().out
 
 
+def test_a_recording_that_was_given_twice_is_named(tmp_path):
+    rows = [{"trial": f"{k}", "athlete": f"a{k % 4}", "condition": "xy"[k // 4], "rise_m": k / 7} for k in range(1, 8)]
+    for twins in (False, True):
+        folder = tmp_path / str(twins)
+        again = [rows[2] | {"trial": "again"}] if twins else []
+        text = write_comparison(write_results(folder / "in", [*rows, *again]), folder / "out", ["rise_m"])
+        assert ("3 and again have the same numbers to the last digit" in text) == twins
+
+
 def test_failed_trials_are_named_in_the_text(tmp_path):
     rows = [{"trial": f"{k}", "athlete": f"a{k % 4}", "condition": "xy"[k // 4], "rise_m": 0.1 * k} for k in range(8)]
     rows.append({"trial": "lost", "status": "failed", "error": "no video", "condition": "x", "rise_m": ""})

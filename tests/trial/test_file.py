@@ -215,6 +215,7 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         ("every = 2", "every = 0", "track.every"),
         ("every = 2", "every = 2\nstop = 0", "track.stop"),
         ("every = 2", "evrey = 2", "track.evrey: unknown key; did you mean every?"),
+        ("every = 2", "end = 20", "track.end: unknown key; did you mean stop?"),
         ("every = 2", "whole_run = 1", "track.whole_run: expected true or false (found 1)"),
         ("every = 2", "scale = 3", "track.scale"),
         ("every = 2", 'colour = "blue"', "track.colour"),

@@ -1,5 +1,7 @@
 """Trials of several players: what is read, and what is refused in one line."""
 
+import re
+from contextlib import nullcontext
 from typing import get_args
 
 import numpy as np
@@ -75,6 +77,19 @@ def test_a_point_clicked_in_one_camera_only_is_refused(folder):
     trial = read(folder, f'{head}[[start.player]]\nname = "anna"\npoints_px = {{ {table} }}\n')
     with pytest.raises(TrialError, match="no two cameras agree where torso"):
         player_starts(trial, rig())
+
+
+@pytest.mark.parametrize(("apart_m", "is_refused"), [(0.0, True), (0.1, True), (0.2, False)])
+def test_two_players_in_one_place_are_refused(folder, apart_m, is_refused):
+    text = trial_text()
+    twin = f"\n[[start.player]]\nname = 'twin'\njoints_m = {{torso = [{-0.6 + apart_m}, 0.0, 1.2]}}\n"
+    with pytest.raises(TrialError, match="'Anna' and 'twin' are in one place") if is_refused else nullcontext():
+        player_starts(read(folder, text + twin), rig())
+
+
+def test_a_player_whose_axes_are_exchanged_is_told_so(folder):
+    exchanged = re.sub(r"= \[([-\d.]+), ([-\d.]+), ([-\d.]+)\]", r"= [\1, \3, \2]", trial_text())
+    assert "the legs lie along y, not along z: were axes exchanged? z must point up" in complaint(folder, exchanged)
 
 
 def test_legs_are_tracked_by_blocker_by_default(folder):

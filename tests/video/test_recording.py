@@ -142,6 +142,18 @@ def test_a_broken_image_is_an_empty_view_and_an_event(noisy, tmp_path, damaged_f
     assert trial.events[0].startswith(f"{name}: no image from 0.240 s to 0.260 s")
 
 
+def test_many_gaps_of_a_camera_are_one_event_that_asks_for_the_frame_rate(noisy, tmp_path):
+    packets = packets_of(noisy)
+    broken = noisy
+    for number, name in zip((5, 12, 20), "abc", strict=True):
+        broken = with_noise(broken, tmp_path / f"{name}.mp4", packets[number])
+    trial = recording(broken, noisy)
+    assert len(list(trial)) == len(list(trial)) == 30
+    (event,) = trial.events
+    assert event.startswith("cam1: no image at 3 times, first from 0.100 s to 0.120 s, for 0.020 s at most")
+    assert "the frame rate varies" in event
+
+
 @pytest.mark.parametrize("damaged_first", [True, False])
 def test_images_left_out_of_a_file_are_empty_views(tmp_path, damaged_first):
     kept = [k for k in range(12) if k not in (4, 5, 9)]
@@ -150,7 +162,8 @@ def test_images_left_out_of_a_file_are_empty_views(tmp_path, damaged_first):
     trial = recording(*((gaps, whole) if damaged_first else (whole, gaps)))
     seen = [numbers_of(f.views)[0 if damaged_first else 1] for f in trial]
     assert seen == [k if k in kept else None for k in range(12)]
-    assert len(trial.events) == 2
+    (event,) = trial.events
+    assert "from 0.080 s to 0.120 s and from 0.180 s to 0.200 s" in event
 
 
 def test_a_file_cut_off_in_the_middle_gives_what_it_holds_and_an_event(noisy, tmp_path):

@@ -51,15 +51,19 @@ def write_accepted(path: Path, rig: Rig, missed: Errors) -> tuple[Path, tuple[st
     """Write a rig as Pose2Sim TOML; return where, and why it was rejected: then it has another name, beside."""
     rejected = path.with_name(f"{path.stem}.rejected{path.suffix}")
     reasons = list(_reasons(rig, missed))
-    write_pose2sim(rejected, rig, errors_px=missed.rms_px)
-    reasons += [
-        f"{finding.what}: give lengths in metres, and check that names and clicks belong together"
-        for finding in check_baselines(rig)
-    ]
+    try:
+        write_pose2sim(rejected, rig, errors_px=missed.rms_px)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error  # which the user knows
+    if not reasons:  # else what follows follows from them
+        reasons = [
+            f"{finding.what}: give lengths in metres, and check that names and clicks belong together"
+            for finding in check_baselines(rig)
+        ]
     try:
         read_rig(rejected, unit="m")  # its distances are judged already
     except CalibrationError as error:
-        reasons.append(f"the file cannot be read back: {error}")
+        reasons = reasons or [f"the file cannot be read back: {error}"]
     return (rejected, tuple(reasons)) if reasons else (rejected.replace(path), ())
 
 

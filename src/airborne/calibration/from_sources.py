@@ -96,11 +96,13 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
         notes=(*inputs.notes, *_lag_notes(lags)),
     )
     rig, rms_px, left_out_px = final.rig, final.rms_px(), calibration.held_out_rms_px
+    camera_sd = final.camera_sd
     if left_out_px > rms_px > 0:
-        rig = _with_wider_errors(rig, np.full(len(rig), left_out_px / rms_px))
+        wider = left_out_px / rms_px
+        rig, camera_sd = _with_wider_errors(rig, np.full(len(rig), wider)), wider * camera_sd
     if inputs.points:
         rig = Rig(tuple(replace(camera, world_sd=SURVEYED_SD) for camera in rig))
-    return replace(calibration, adjustment=replace(final, rig=rig))
+    return replace(calibration, adjustment=replace(final, rig=rig, camera_sd=camera_sd))
 
 
 def _resect_misplaced(inputs: Inputs) -> tuple[Rig, tuple[Resection, ...]]:

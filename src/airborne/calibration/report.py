@@ -23,7 +23,7 @@ _OPEN_SD_M = 1.0  # of a camera's place; chosen between wands, up to 0.2, and le
 
 def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
     """Return everything as plain values for JSON; None where a value does not exist."""
-    adjusted = calibration.adjustment
+    adjusted, findings = calibration.adjustment, diagnose(calibration)
     cameras = {}
     for i, camera in enumerate(calibration.rig):
         sd = _sds(calibration, camera)
@@ -57,10 +57,9 @@ def calibration_to_dict(calibration: RigCalibration) -> dict[str, Any]:
         "mended": [mending.describe() for mending in calibration.resections],
         "notes": list(calibration.notes),
         "findings": [
-            {"kind": each.kind, "cameras": list(each.cameras), "sentence": each.sentence}
-            for each in diagnose(calibration)
+            {"kind": each.kind, "cameras": list(each.cameras), "sentence": each.sentence} for each in findings
         ],
-        "warnings": list(calibration_warnings(calibration)),
+        "warnings": list(calibration_warnings(calibration, is_misfit=any(each.kind == "misfit" for each in findings))),
     }
 
 
@@ -133,8 +132,8 @@ def residual_distances_px(calibration: RigCalibration) -> list[Array]:
     return [np.linalg.norm(residual, axis=1) for residual in calibration.adjustment.residual_px]
 
 
-def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
-    """Return plain sentences about what casts doubt on the calibration."""
+def calibration_warnings(calibration: RigCalibration, *, is_misfit: bool) -> tuple[str, ...]:
+    """Return plain sentences about what casts doubt on the calibration; is_misfit: clicked points do not fit."""
     sentences = []
     if not calibration.adjustment.has_converged:
         sentences.append("the adjustment did not come to rest: look at the residuals, a source may contradict another")
@@ -149,14 +148,16 @@ def calibration_warnings(calibration: RigCalibration) -> tuple[str, ...]:
     if held_out_px > _SUSPECT_RATIO * rms_px:
         sentences.append(
             f"what is left out of the fit lies {held_out_px / rms_px:.1f} times as far from its prediction as what is "
-            "in it: the standard deviations in this report are too small by about as much, those in the calibration "
-            "file are enlarged by it; record more poses, slower, in every corner"
+            "in it: the standard deviations, here and in the calibration file, are enlarged by it; record more poses, "
+            "slower, in every corner"
         )
     places = [each.name for each in calibration.rig if _place_sd_m(_sds(calibration, each)) > _OPEN_SD_M]
-    if places:
+    if places and not is_misfit:  # else a wrong point, and no lacking one, leaves them open
+        found = calibration.inputs.start_rig is not None
+        of_start = ": their places are those of [start], which were found with other lenses" if found else ""
         sentences.append(
-            f"no source shows where {', '.join(places)} stand: their places are those of [start], which were found "
-            "with other lenses; add control points, a wand, a court or a board that several cameras see"
+            f"no source shows where {', '.join(places)} stand{of_start}; add control points, a wand, a court or a "
+            "board that several cameras see"
         )
     return tuple(sentences)
 

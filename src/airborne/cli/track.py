@@ -104,7 +104,7 @@ def track_command(
         if run.was_finished:
             print(f"{output} holds this run, finished; nothing was tracked again (--overwrite tracks it anew)")
         print(f"{_describe(run.summary, output)}\nresults: {_describe_results(output)}")
-    if run.summary["n_frames"] == run.summary["n_lost"]:
+    if not run.summary["n_tracked"]:
         raise typer.Exit(1)
 
 

@@ -21,6 +21,10 @@ from airborne.types import Array, Triple
 
 _SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
 _HARDLY_ANY = 0.2  # share within two sds; 0.95 is expected
+_QUESTIONS = {
+    "position": "is this the reference of this recording, in its world",
+    "rotation": "do r00..r22 turn the body's axes into the world's, row by row, and not the other way, transposed",
+}
 _OTHER_WAY = 10.0  # times nearer once turned to what looks the same: no noise does that
 _FAR_MM = 20_000.0  # beyond any error of a body in a hall
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
@@ -126,8 +130,8 @@ class MotionComparison:
                     f"{name} errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
                     f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
                 )
-        if self.position_calibration.n and self.position_calibration.within_2sd < _HARDLY_ANY:
-            lines.append("hardly any position lies within 2 sd: is this the reference of this recording, in its world?")
+            if share.n and share.within_2sd < _HARDLY_ANY:
+                lines.append(f"hardly any {name} lies within 2 sd: {_QUESTIONS[name]}?")
         if self.better_shift_s:
             lines.append(
                 f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, the RMS in space would be "

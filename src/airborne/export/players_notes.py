@@ -13,6 +13,9 @@ from airborne.motion.jumps.standing_posture import NEAR_S, WINDOW_S
 
 _PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
 
+_EVENT_TAKES = "each takes frames of contact beside it, and close to it a tracked ankle"
+_UNKNOWN_EVENTS = {"no take-off": "take-off is", "no landing": "landing is", "neither": "take-off and landing are"}
+
 
 def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
     """Yield what speaks against the players and jumps of a summary; of a body nothing."""
@@ -73,6 +76,8 @@ def jump_notes(jump: Mapping[str, Any]) -> Iterator[str]:
             f"its feet rose {tuck_m:.2f} m more than its hips, so the legs went astray: their height, take-off and "
             "landing are withheld; look at the overlay videos: was a camera moved?"
         )
+    elif jump["status"] != "whole":
+        yield f"{_UNKNOWN_EVENTS[jump['status']]} not known: {_EVENT_TAKES}"
     if not is_known(jump["hip_height_m"]):
         yield f"how high the hips rose is not known: {_PEAK_TAKES}"
     elif jump["standing_source"] == "lengths":

@@ -53,4 +53,4 @@ class Stages(ExitStack):
         if what != self._what:
             self.close()
             self._what, self._report = what, self.enter_context(progress(what))
-        self._report(done, total)
+        self._report(done, None if total is None else max(done, total))  # durations that files state may be short

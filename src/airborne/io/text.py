@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import errno
 import json
@@ -22,6 +23,8 @@ _LARGEST_CSV_BYTES = 50_000_000  # likewise
 _MOST_BRACKETS = 200  # in a flat YAML file
 _LARGEST_YAML_BYTES = 100_000  # likewise: it is parsed slowly
 
+_CONTROLS = re.compile(rb"[\x00-\x08\x0e-\x1f]")  # which no text has, whatever its letters' encoding
+_SEPARATORS = {";": "semicolons", "\t": "tabs"}
 _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes quadratic time
 
 
@@ -46,7 +49,8 @@ def read_text(path: Path, most_bytes: int) -> str:
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError:
-        raise ValueError("it is not a text file") from None
+        is_other = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or not _CONTROLS.search(data)
+        raise ValueError(f"it is not a text file{' in UTF-8; save it as UTF-8' if is_other else ''}") from None
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -123,7 +127,12 @@ def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[in
         rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     except csv.Error as failure:
         raise error(f"{path}, row {reader.line_num}: not a table with commas ({failure}); {expected}") from None
-    return [(line, row) for line, row in rows if any(row)]
+    rows = [(line, row) for line, row in rows if any(row)]
+    header = rows[0][1] if rows else []
+    for separator, name in _SEPARATORS.items():
+        if len(header) == 1 and separator in header[0]:
+            raise error(f"{path}: columns are separated by {name}; save it with commas and decimal points; {expected}")
+    return rows
 
 
 def parse_editable_toml(text: str) -> tomlkit.TOMLDocument:

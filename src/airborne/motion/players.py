@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from airborne.body.legs import LEG_POINTS
 from airborne.errors import ResultError, count
 from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
-from airborne.io.writing import explain_full_disk
+from airborne.io.writing import explain_full_disk, replace_text
 from airborne.motion.tables import cell
 from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Status
@@ -30,6 +30,7 @@ _FARTHEST_M = 1e6  # of a joint: no coordinate beyond it
 _POSITION = ("x_m", "y_m", "z_m")
 _COVARIANCE = tuple(f"cov_{'xyz'[i]}{'xyz'[j]}_m2" for i, j in zip(*_UPPER, strict=True))
 PLAYERS_COLUMNS = ("player", "frame", "time_s", "status", "joint", *_POSITION, "sd_m", *_COVARIANCE, "score", "n_views")
+_HEADER = ",".join(PLAYERS_COLUMNS) + "\n"
 _TEXTS, _WHOLE = ("player", "status", "joint"), ("frame", "n_views")
 _EXPECTED = "expected the joints.csv of a run of players"
 
@@ -94,6 +95,11 @@ class PlayersMotion:
         """Standard deviations of the joints, the root mean square of their axes': (n, players, joints) [m]."""
         return np.asarray(standard_deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1).mean(axis=-1)))
 
+    def without_tracked(self) -> PlayersMotion:
+        """Return the same with what is tracked called uncertain."""
+        is_tracked = self.joint_status == Status.TRACKED.value
+        return replace(self, joint_status=np.where(is_tracked, Status.UNCERTAIN.value, self.joint_status))
+
     def count(self, player: str, status: Status) -> int:
         """Count the frames in which a player has a status."""
         return int(np.sum(self.status[:, self.players.index(player)] == status.value))
@@ -119,7 +125,7 @@ class PlayersWriter:
         self._n_finished_bytes = _whole_lines_end(path) if resume and path.exists() else 0
         self._file = path.open("r+b" if self._n_finished_bytes else "wb")
         self._file.truncate(self._n_finished_bytes)
-        self._write(",".join(PLAYERS_COLUMNS) + "\n", "its first line")
+        self._write(_HEADER, "its first line")
 
     def __enter__(self) -> PlayersWriter:
         return self
@@ -195,6 +201,11 @@ def read_players(path: Path) -> PlayersMotion:
     )
 
 
+def write_players(path: Path, motion: PlayersMotion) -> None:
+    """Write a whole joints.csv anew, in the place of what is there."""
+    replace_text(path, "".join([_HEADER, *_lines(motion)]))
+
+
 def write_players_parquet(path: Path, table_csv: Path) -> None:
     """Write the table of a joints.csv as Parquet, with its units in the metadata; empty cells become null.
 
@@ -211,16 +222,17 @@ def write_players_parquet(path: Path, table_csv: Path) -> None:
 
 
 def _lines(motion: PlayersMotion) -> list[str]:
-    """Lay out the rows of one time."""
+    """Lay out the rows of all times."""
     lines = []
-    upper = motion.covariance[0][..., *_UPPER]
-    numbers = np.concatenate([motion.points[0], motion.sd[0, ..., None], upper], axis=-1).tolist()
-    for p, player in enumerate(motion.players):
-        shared = [player, str(motion.index[0]), cell(float(motion.time_s[0]))]
-        ends = [cell(float(motion.score[0, p])), str(motion.n_views[0, p])]
-        for j, joint in enumerate(motion.joints):
-            own = [str(motion.joint_status[0, p, j]), joint, *map(cell, numbers[p][j])]
-            lines.append(",".join([*shared, *own, *ends]) + "\n")
+    upper = motion.covariance[..., *_UPPER]
+    numbers = np.concatenate([motion.points, motion.sd[..., None], upper], axis=-1).tolist()
+    for n, time_s in enumerate(motion.time_s.tolist()):
+        for p, player in enumerate(motion.players):
+            shared = [player, str(motion.index[n]), cell(time_s)]
+            ends = [cell(float(motion.score[n, p])), str(motion.n_views[n, p])]
+            for j, joint in enumerate(motion.joints):
+                own = [str(motion.joint_status[n, p, j]), joint, *map(cell, numbers[n][p][j])]
+                lines.append(",".join([*shared, *own, *ends]) + "\n")
     return lines
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from airborne.io.writing import explain_full_disk
 from airborne.motion.players import PLAYERS_COLUMNS, PlayersMotion
 from airborne.tracking import Status
 
@@ -19,19 +18,6 @@ def without_untracked(motion: PlayersMotion) -> PlayersMotion:
     is_untracked = ~(motion.status == Status.TRACKED.value).any(axis=0)
     is_doubted = is_untracked[:, None] & (motion.joint_status == Status.TRACKED.value)
     return replace(motion, joint_status=np.where(is_doubted, Status.UNCERTAIN.value, motion.joint_status))
-
-
-def revise_players(path: Path, motion: PlayersMotion) -> None:
-    """Write the statuses of a motion into its joints.csv; the whole table takes the place of the one before."""
-    header, *lines = path.read_text(encoding="utf-8").splitlines()
-    unfinished = path.with_name(path.name + ".part")
-    with explain_full_disk(path), unfinished.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(header + "\n")
-        for line, status in zip(lines, motion.joint_status.ravel().tolist(), strict=False):  # the last may be torn
-            cells = line.split(",")
-            cells[_STATUS] = status
-            file.write(",".join(cells) + "\n")
-    unfinished.replace(path)
 
 
 def has_untracked_player(path: Path) -> bool:

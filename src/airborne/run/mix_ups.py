@@ -1,7 +1,8 @@
-"""Mix-ups of a trial's videos, before anything is tracked: the same file twice, files exchanged, mirrored images.
+"""Mix-ups of a trial's videos, before anything is tracked: the same file twice, exchanged, mirrored, upside down.
 
 At the start, each video's foreground, what is not in its median image, is compared with the body's silhouette in every
-camera: exchanged files agree with each other's cameras, a mirrored image with its own camera's silhouette mirrored.
+camera: exchanged files agree with each other's cameras, a mirrored image, or one that stands upside down, with its own
+camera's silhouette once it is mirrored or turned by 180 degrees.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.surface import surface_arrays
@@ -81,29 +84,31 @@ def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: l
     own = _agreements(images, silhouettes)
     clear = [max(_LEAST_AGREEMENT, each / _MOST_OF_IT) for each in own]
     findings, right = [], list(images)
-    for mix_up in possible_mix_ups(len(names)):
-        a, b = mix_up.cameras[0], mix_up.cameras[-1]
-        if mix_up.is_exchange:
-            crossed = _agreement(images[a], silhouettes[b]), _agreement(images[b], silhouettes[a])
-            how = f"in that of {names[b]}, whose video fits in turn"
-        elif any(names[a] in finding.cameras for finding in findings):
-            continue
-        else:
-            crossed = (_agreement(_mirror(images[a]), silhouettes[a]),) * 2
-            how = "once it is mirrored"
-        if crossed[0] >= clear[a] and crossed[1] >= clear[b]:
-            findings.append(mix_up.finding(names, _compare(names[a], own[a], crossed[0], how)))
-            right[a], right[b] = (images[b], images[a]) if mix_up.is_exchange else (_mirror(images[a]),) * 2
+    for mix_up, crossed in sorted(_crossed(images, silhouettes), key=lambda each: -min(each[1])):
+        concerned = mix_up.cameras
+        is_new = all(right[i] is images[i] for i in concerned)
+        if is_new and all(other >= clear[i] for i, other in zip(concerned, crossed, strict=True)):
+            what = _compare(names[concerned[0]], own[concerned[0]], crossed[0], mix_up.how(names))
+            findings.append(mix_up.finding(names, what))
+            for i, image in zip(concerned, mix_up.undo_images(images), strict=True):
+                right[i] = image
     agreements = zip(right, _agreements(right, silhouettes), strict=True)
     explained = [agreement for image, agreement in agreements if image is not None]
     return findings if findings and np.mean(explained) >= _LEAST_EXPLAINED else []
 
 
+def _crossed(images: Sequence[Mask | None], silhouettes: Sequence[Mask]) -> Iterator[tuple[MixUp, list[float]]]:
+    """Yield each possible mix-up with the agreement of its cameras' images without it."""
+    for mix_up in possible_mix_ups(len(images)):
+        yield mix_up, _agreements(mix_up.undo_images(images), [silhouettes[i] for i in mix_up.cameras])
+
+
 @dataclass(frozen=True, slots=True)
 class MixUp:
-    """Two cameras' videos exchanged, or one camera's images mirrored: by their places in the rig."""
+    """Two cameras' videos exchanged, or one's images mirrored, or upside down: by their places in the rig."""
 
     cameras: tuple[int, ...]
+    is_turned: bool = False  # one camera's images, by 180 degrees
 
     @property
     def is_exchange(self) -> bool:
@@ -113,7 +118,27 @@ class MixUp:
     def describe(self, names: Sequence[str]) -> str:
         """Return how its images would be right, by the rig's names."""
         of = join_names([names[i] for i in self.cameras])
-        return f"the images of {of} {'exchanged' if self.is_exchange else 'mirrored'}"
+        return f"the images of {of} {'exchanged' if self.is_exchange else self._flipped}"
+
+    def how(self, names: Sequence[str]) -> str:
+        """Return how the first of its cameras agrees, by the rig's names."""
+        if self.is_exchange:
+            return f"in that of {names[self.cameras[1]]}, whose video fits in turn"
+        return f"once it is {self._flipped}"
+
+    @property
+    def _flipped(self) -> str:
+        return "turned by 180°" if self.is_turned else "mirrored"
+
+    def _flip(self, image: NDArray[Any]) -> NDArray[Any]:
+        """Return one camera's image (h, w, ...) as it would be without it."""
+        return np.ascontiguousarray(image[::-1, ::-1] if self.is_turned else image[:, ::-1])
+
+    def undo_images(self, images: Sequence[Mask | None]) -> list[Mask | None]:
+        """Return the images of its cameras as they would be without it, of those of all cameras."""
+        if self.is_exchange:
+            return [images[i] for i in reversed(self.cameras)]
+        return [None if (image := images[i]) is None else self._flip(image) for i in self.cameras]
 
     def undo(self, frames: Frames) -> Frames | None:
         """Return frames with the images as they would be without it; None where one is missing or does not fit."""
@@ -122,7 +147,7 @@ class MixUp:
             view = frames.views[i]
             if view is None or source is None or view.camera.size != source.camera.size:
                 return None
-            views[i] = replace(view, image=source.rgb if self.is_exchange else np.ascontiguousarray(view.rgb[:, ::-1]))
+            views[i] = replace(view, image=source.rgb if self.is_exchange else self._flip(view.rgb))
         return replace(frames, views=tuple(views))
 
     def finding(self, names: Sequence[str], what: str) -> Finding:
@@ -132,6 +157,9 @@ class MixUp:
             both = join_names(cameras)
             advice = f"the videos of {both}, or their calibrations, are exchanged; exchange them back"
             return Finding(kind="swapped", what=what, advice=advice, cameras=cameras)
+        if self.is_turned:
+            advice = f"the images of {cameras[0]} stand upside down; write its video anew, turned by 180°"
+            return Finding(kind="turned", what=what, advice=advice, cameras=cameras)
         advice = (
             f"the images of {cameras[0]} are mirrored; switch that off in the camera, and record or convert anew, or "
             "calibrate it anew if it was moved"
@@ -140,37 +168,33 @@ class MixUp:
 
 
 def possible_mix_ups(n_cameras: int) -> list[MixUp]:
-    """Return what can be mixed up: each two cameras' videos, and each camera's images."""
-    return [MixUp(cameras) for n in (2, 1) for cameras in combinations(range(n_cameras), n)]
+    """Return what can be mixed up: each two cameras' videos, and each camera's images, mirrored or upside down."""
+    exchanged, alone = (list(combinations(range(n_cameras), n)) for n in (2, 1))
+    return [*map(MixUp, exchanged), *map(MixUp, alone), *(MixUp(camera, is_turned=True) for camera in alone)]
 
 
 def undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyModel, start: Pose) -> list[MixUp]:
     """Return the mix-ups that what stands out in the cameras at the start does not speak against.
 
-    It does where an image agrees with its own camera's silhouette, or better than as the mix-up would have it.
+    It does where an image agrees with its own camera's silhouette better than as the mix-up would have it. Beside each
+    other, cameras see the body in the same part of the image: there an exchanged one agrees with both silhouettes. For
+    one upside down something must speak: wrongly turned, an image shows nothing of the body, as if it were left out.
     """
     silhouettes = [_silhouette(model, start, camera) for camera in rig]
     own = _agreements(foregrounds, silhouettes)
 
-    def is_possible(mix_up: MixUp) -> bool:
-        if mix_up.is_exchange:
-            images = [foregrounds[i] for i in reversed(mix_up.cameras)]
-        else:
-            images = [_mirror(foregrounds[i]) for i in mix_up.cameras]
-        crossed = _agreements(images, [silhouettes[i] for i in mix_up.cameras])
-        return all(
-            own[i] < _LEAST_AGREEMENT and own[i] <= other for i, other in zip(mix_up.cameras, crossed, strict=True)
+    return [
+        mix_up
+        for mix_up, crossed in _crossed(foregrounds, silhouettes)
+        if all(
+            own[i] < other or (own[i] == other and not mix_up.is_turned)
+            for i, other in zip(mix_up.cameras, crossed, strict=True)
         )
-
-    return list(filter(is_possible, possible_mix_ups(len(rig))))
+    ]
 
 
 def _compare(name: str, own: float, other: float, how: str) -> str:
     return f"the body at the start agrees with what moves in {name} to {max(own, 0):.0%}, to {other:.0%} {how}"
-
-
-def _mirror(image: Mask | None) -> Mask | None:
-    return None if image is None else image[:, ::-1]
 
 
 def _agreements(images: Sequence[Mask | None], silhouettes: Sequence[Mask]) -> list[float]:

@@ -14,11 +14,13 @@ from airborne.calibration.from_points import Calibration
 from airborne.export.overlays import OverlaysAs
 from airborne.export.players_overlay import PlayersOverlayVideos
 from airborne.motion import PlayersMotion, PlayersWriter, read_players, write_players_parquet
+from airborne.motion.jumps.gravity import find_wrong_gravity
 from airborne.motion.jumps.heights import LEAST_RATE_HZ, describe_slow_falls, measure_jumps
 from airborne.motion.jumps.table import jump_row, write_jumps
+from airborne.motion.players import write_players
 from airborne.motion.players_doubts import describe_player_doubts
 from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, videos_of
-from airborne.motion.untracked_players import has_untracked_player, revise_players, without_untracked
+from airborne.motion.untracked_players import has_untracked_player, without_untracked
 from airborne.run.opening import Opened
 from airborne.run.players_cameras import CameraCheck
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
@@ -138,13 +140,19 @@ class PlayersRun:
         """Write the tables; return the motion and the beginning of the summary."""
         tracked = read_players(folder / self.table)
         motion = without_untracked(tracked)
+        wrong = find_wrong_gravity(motion)
+        if wrong is not None:
+            motion = motion.without_tracked()
         if not np.array_equal(motion.joint_status, tracked.joint_status):
-            revise_players(folder / self.table, motion)
+            write_players(folder / self.table, motion)
         write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)
         jumps = measure_jumps(motion)
         self.recording.events.extend(describe_slow_falls(motion))
         write_jumps(folder / JUMPS, jumps)
-        return motion, {**self._summary(tracked), "jumps": [jump_row(jump) for jump in jumps]}
+        said = [] if wrong or self._is_slow else motion.players  # of a wrong world or rate, which makes all uncertain
+        doubts = {name: self._doubts(tracked, name) for name in said}
+        summary = {**self._summary(tracked, doubts), "jumps": [jump_row(jump) for jump in jumps]}
+        return motion, summary if wrong is None else summary | {"self_check": [wrong.to_dict()]}
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: PlayersMotion) -> None:
         """Write the report."""
@@ -152,7 +160,7 @@ class PlayersRun:
 
         write_players_report(folder, summary, motion)
 
-    def _summary(self, motion: PlayersMotion) -> dict[str, Any]:
+    def _summary(self, motion: PlayersMotion, doubts: Mapping[str, list[str]]) -> dict[str, Any]:
         is_tracked, is_lost = (motion.status == status.value for status in (Status.TRACKED, Status.LOST))
         n_tracked, n_lost = int(is_tracked.all(axis=1).sum()), int(is_lost.all(axis=1).sum())
         recording = self.recording
@@ -166,7 +174,7 @@ class PlayersRun:
             "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
             "rate_hz": round(float(recording.rate), 6),
             "players": {
-                name: {**_player(motion, k, len(recording.rig)), "doubts": self._doubts(motion, name)}
+                name: {**_player(motion, k, len(recording.rig)), "doubts": doubts.get(name, [])}
                 for k, name in enumerate(motion.players)
             },
             "bystanders": [start.name for start in self.starts if not start.has_legs],
@@ -174,11 +182,10 @@ class PlayersRun:
         }
 
     def _doubts(self, motion: PlayersMotion, name: str) -> list[str]:
-        """Say which joints are uncertain, and why; not of images that come too rarely, which make all of them so."""
+        """Say which joints are uncertain, and why."""
         is_blocker = isinstance(self.players, Blocker)
         most_sd_m = BLOCKER_SD_M if is_blocker else PARTICLE_SD_M
-        found = describe_player_doubts(motion, name, most_sd_m=most_sd_m, is_joint_alone=is_blocker)
-        return [] if self._is_slow else list(found)
+        return list(describe_player_doubts(motion, name, most_sd_m=most_sd_m, is_joint_alone=is_blocker))
 
     def keep(self, frames: Frames) -> None:
         """Keep nothing: players are not checked at the end."""

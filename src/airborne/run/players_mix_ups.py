@@ -1,8 +1,8 @@
-"""Mix-ups of the videos of players, before they are tracked: files exchanged, mirrored images.
+"""Mix-ups of the videos of players, before they are tracked: exchanged, mirrored, upside down.
 
 Where a camera does not show the players at the start, they are fitted to the first images once more: with those of two
-cameras exchanged, and with those of one mirrored. Their colours and edges tell more than what moves, which may be
-little before a jump.
+cameras exchanged, and with those of one mirrored or turned by 180 degrees. Their colours and edges tell
+more than what moves, which may be little before a jump.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ import csv
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from airborne.types import Array
 from airborne.video import Frames, View
 
 _CLEARLY = 0.5  # cosine of lines from right to left; chosen so that a pelvis may turn 60 degrees over the legs
+_LEAST_APART_M = 0.15  # chosen: the middles of two trunks, each 0.2 m deep or more, are farther from each other
 _AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 _LARGEST_TABLE_BYTES = 50_000_000  # larger files are refused
@@ -51,7 +53,7 @@ def players_tracker_of(trial: Trial, rig: Rig) -> PlayersTracker:
 def player_starts(trial: Trial, rig: Rig) -> tuple[PlayerStart, ...]:
     """Return where every player and bystander starts; what was clicked is triangulated.
 
-    Raises TrialError for points that cannot be a player's, or that fewer than two cameras see.
+    Raises TrialError for points that cannot be a player's, or fewer than two cameras see, and for two in one place.
     """
     starts = []
     for player in trial.start.player:
@@ -64,7 +66,18 @@ def player_starts(trial: Trial, rig: Rig) -> tuple[PlayerStart, ...]:
             starts.append(start_of(player.name, dict(zip(names, points.tolist(), strict=True))))
         except ValueError as error:
             raise TrialError(f"{trial.name}: player '{player.name}': {error}") from None
+    _check_apart(trial, starts)
     return tuple(starts)
+
+
+def _check_apart(trial: Trial, starts: Sequence[PlayerStart]) -> None:
+    """Raise TrialError where two players or bystanders are in one place."""
+    for one, other in combinations(starts, 2):
+        if np.linalg.norm(one.joints_m["torso"] - other.joints_m["torso"]) < _LEAST_APART_M:
+            raise TrialError(
+                f"{trial.name}: players '{one.name}' and '{other.name}' are in one place; is it the same player twice? "
+                "Remove one, or correct its joints"
+            )
 
 
 def start_notes(starts: Sequence[PlayerStart]) -> list[str]:

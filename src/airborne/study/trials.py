@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from airborne.batch.trials import TABLE
+from airborne.cameras.finding import join_names
 from airborne.errors import ResultError
 from airborne.io.names import check_path
 from airborne.io.text import read_csv
@@ -15,6 +17,7 @@ ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
 LARGEST = 1e100  # no measurement is larger, and its square is still a number
 _EMPTY = ("", "nan")  # cells without a number
 _FORM = "the table of a batch has columns trial, athlete, condition, status, folder"
+_MEASURED = re.compile(r"-?\d*\.\d{8,}(e[-+]\d+)?")  # chosen: of eight decimals no two recordings have the same
 _NEEDED = {"trial", "status", "error", "folder", CONDITION}
 
 
@@ -100,6 +103,21 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
     if missing:
         raise ResultError(f"{folder / TABLE}: no finished trial of condition {missing[0]}; it has: {', '.join(found)}")
     return Study(tuple(trials), tuple(conditions) or tuple(found), tuple(left_out))
+
+
+def describe_twins(trials: Sequence[StudyTrial]) -> list[str]:
+    """Name the trials whose measurements are the same to the last digit, as of a recording that was given twice."""
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for trial in trials:
+        measured = tuple(cell for cell in trial.row.values() if _MEASURED.fullmatch(cell))
+        if measured:
+            alike.setdefault(measured, []).append(trial.name)
+    return [
+        f"{join_names(names)} have the same numbers to the last digit: are they one recording, given {len(names)} "
+        "times? Then its spread says nothing"
+        for names in alike.values()
+        if len(names) > 1
+    ]
 
 
 def _folder_of(folder: Path, row: Mapping[str, str]) -> Path:

@@ -20,7 +20,7 @@ from airborne.study.curves import require_events
 from airborne.study.figures import write_comparison_figures
 from airborne.study.spm import check_spm1d
 from airborne.study.text import describe_study
-from airborne.study.trials import read_study
+from airborne.study.trials import describe_twins, read_study
 
 MEANS, DIFFERENCES, CURVES, CLUSTERS = "means.csv", "differences.csv", "curves.csv", "clusters.csv"
 TEXT = "comparison.txt"
@@ -61,6 +61,8 @@ def write_comparison(
     text = describe_study(compared, events, real_time=real_time)
     left_out = "".join(f"{line}\n" for line in study.left_out)
     text = text.replace("\nReferences\n", f"{left_out}\nReferences\n") if left_out else text
+    if twins := describe_twins(study.trials):
+        text = "\n".join(["Read this first", *twins, "", text])
     write_text(folder / TEXT, text)
     return text
 

@@ -16,6 +16,8 @@ from airborne.trial.table import ClickTable, SettingsTable, Vector
 
 _FEET = ("foot_left", "foot_right")
 _MOST_UNDER_FLOOR_M = 0.3  # by how much a calibration's floor may be off
+# chosen: horizontal over vertical distance of hips and ankles; no start of a block leans by 45 degrees
+_MOST_LEANING = 2.0
 # chosen: three sds of the mean of both knees or feet, of joints that are 20 mm off each way
 _MOST_BEHIND_M = 0.05
 
@@ -78,6 +80,14 @@ def check_point_names(points: Iterable[str]) -> None:
 
 def _check_legs(start: PlayerStart) -> None:
     points = np.array([start.joints_m[point] for point in LEG_POINTS])
+    across, up_m = (
+        np.abs(points[:2].mean(axis=0) - points[4:].mean(axis=0))[:2],
+        points[:2, 2].mean() - points[4:, 2].mean(),
+    )
+    if across.max() > _MOST_LEANING * abs(up_m):
+        raise ValueError(
+            f"the legs lie along {'xy'[int(across.argmax())]}, not along z: were axes exchanged? z must point up"
+        )
     if points[:2, 2].min() < points[4:, 2].max():
         raise ValueError("a hip lies lower than an ankle; were they exchanged?")
     _check_facing(start)

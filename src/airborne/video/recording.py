@@ -15,6 +15,7 @@ from airborne.errors import VideoError
 from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, decode, inspect, rgb_from_decoded
 from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
+from airborne.video.gaps import describe_gaps
 from airborne.video.lazy import ConversionCache, lazy_view
 from airborne.video.outages import N_LISTED
 from airborne.video.prefetch import read_ahead
@@ -44,6 +45,7 @@ class Recording:
     stop: int | None
     is_lazy: bool = False
     events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
+    _gaps: dict[str, dict[Fraction, Fraction]] = field(default_factory=dict)  # of each camera, from -> to [s]
     _known: dict[tuple[str, bool], tuple[Camera, dict[int | None, Undistortion]]] = field(default_factory=dict)
 
     @property
@@ -130,10 +132,7 @@ class Recording:
             for image in stream:
                 time_s = source.trial_time(image.time_s)
                 if time_s > expected_s + period_s / 2:
-                    self._note(
-                        f"{source.name}: no image from {float(expected_s):.3f} s to {float(time_s):.3f} s (damaged "
-                        "or missing); images after it may carry damage up to the next key frame"
-                    )
+                    self._note_gap(source.name, expected_s, time_s)
                 if (repeated_s := changes.add(image)) is not None and (n_repeated := n_repeated + 1) <= N_LISTED:
                     self._note_repeated(source, repeated_s)
                 yield image._replace(time_s=time_s)
@@ -153,6 +152,16 @@ class Recording:
             f"{source.name}: frame {frame} ({float(time_s):.3f} s) repeats the picture before it: if the camera filmed "
             "on, its pictures are late from there; take the repeated one out of the video"
         )
+
+    def _note_gap(self, name: str, from_s: Fraction, to_s: Fraction) -> None:
+        """Note a gap in the one line that says all of a camera's."""
+        gaps = self._gaps.setdefault(name, {})
+        before = describe_gaps(name, gaps) if gaps else None
+        gaps[from_s] = to_s
+        if before in self.events:
+            self.events[self.events.index(before)] = describe_gaps(name, gaps)
+        else:
+            self.events.append(describe_gaps(name, gaps))
 
     def _note(self, event: str) -> None:
         if event not in self.events:  # a recording may be read twice

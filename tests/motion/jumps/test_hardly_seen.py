@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from airborne.export.players_notes import jump_notes
+from airborne.motion.jumps.table import jump_row
 from tests.support.jumping import G, Jumper, motion_of, only
 
 CLEAN = Jumper()
@@ -17,6 +19,17 @@ def test_a_take_off_that_one_camera_alone_saw_is_not_stated():
     jump = only(replace(motion, joint_status=status, n_views=n_views))
     assert jump.status == "no take-off" and np.isnan(jump.takeoff_speed_height_m).all()
     assert np.isfinite(jump.landing_s).all() and np.isfinite(jump.hip_height_m).all()
+
+
+def test_events_near_which_no_ankle_is_tracked_are_not_stated_though_two_cameras_saw_them():
+    status = motion_of(CLEAN).joint_status.astype("<U9")
+    status[3:, :, -2:] = "uncertain"
+    jump = only(replace(motion_of(CLEAN), joint_status=status))
+    assert jump.status == "neither" and np.isnan([*jump.flight_time_height_m, *jump.takeoff_speed_height_m]).all()
+    assert np.isfinite(jump.hip_height_m).all()
+    assert any("take-off and landing are not known" in note for note in jump_notes(jump_row(jump)))
+    status[-50:, :, -1] = "tracked"
+    assert only(replace(motion_of(CLEAN), joint_status=status)).status == "no take-off"
 
 
 def test_a_peak_that_one_camera_alone_saw_has_no_height():

@@ -9,9 +9,13 @@ import numpy as np
 from airborne.calibration.diagnosis.boards import check_board_print
 from airborne.calibration.diagnosis.clocks import check_counter, check_times
 from airborne.calibration.initial.chaining import FEWEST_LENS_VIEWS, Views
+from airborne.calibration.sources.boards import Board
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
 from airborne.types import Image
+
+# chosen: of a board's longer side; a sheet of A0, the largest that is printed, is 1.2 m long, and a playing card 0.09 m
+_LEAST_SIDE_M, _MOST_SIDE_M = 0.08, 1.6
 
 
 def check_board(views: Views, samples: Mapping[str, Sequence[Image]]) -> tuple[Finding, ...]:
@@ -19,13 +23,28 @@ def check_board(views: Views, samples: Mapping[str, Sequence[Image]]) -> tuple[F
 
     Raises CalibrationError, with the reason, where a camera shows the board too rarely to fit its lens.
     """
-    findings: list[Finding] = []
+    findings = check_board_size(views.board)
     for name, row in zip(views.cameras, views.detections, strict=True):
         own = check_board_print(views.board, samples[name], name)
         if own and sum(len(sighting.corner) > 0 for sighting in row) < FEWEST_LENS_VIEWS:
             raise CalibrationError(own[0].sentence)
         findings += own
     return tuple(findings)
+
+
+def check_board_size(board: Board) -> list[Finding]:
+    """Report a board whose squares come out at a size that nobody holds."""
+    sides_m = [(n + 1) * board.square_m for n in board.inner_size]
+    if _LEAST_SIDE_M <= max(sides_m) <= _MOST_SIDE_M:
+        return []
+    across, down = (f"{side_m:.2g}" for side_m in sides_m)
+    return [
+        Finding(
+            kind="board",
+            what=f"the board is {across} m × {down} m by its file, squares of {board.square_m:.3g} m",
+            advice="measure a square of the print: all lengths of the calibration follow from it, in metres",
+        )
+    ]
 
 
 def check_time_stamps(camera: str, rows: Sequence[Mapping[str, str]]) -> Iterator[Finding]:

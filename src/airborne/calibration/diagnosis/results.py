@@ -11,6 +11,7 @@ from airborne.calibration.diagnosis.clocks import check_rolling_shutter
 from airborne.calibration.diagnosis.coverage import check_coverage, check_links, check_tilts, check_view_count
 from airborne.calibration.diagnosis.images import check_floor, check_roll, check_swapped_files
 from airborne.calibration.diagnosis.moved_cameras import check_moved_cameras
+from airborne.calibration.diagnosis.net import check_net
 from airborne.calibration.from_sources import RigCalibration
 from airborne.calibration.initial.chaining import Views
 from airborne.cameras.finding import Finding
@@ -25,11 +26,12 @@ def diagnose(calibration: RigCalibration) -> tuple[Finding, ...]:
     """Return everything that is wrong, the most serious first; empty for a good recording."""
     inputs, rig = calibration.inputs, calibration.rig
     is_level = bool(inputs.points) or inputs.sources.world.points is not None
+    below = check_floor(rig) if "court" in inputs.points else []
     checks = [
         inputs.findings,
         _check_swapped_files(calibration),
-        check_floor(rig) if "court" in inputs.points else (),
-        check_baselines(rig),
+        below,
+        () if below else check_baselines(rig),  # of a world that is folded over, distances say nothing
         _check_clicks(calibration),
         check_roll(rig, _UP if is_level else None),
         _check_moved_cameras(calibration),
@@ -46,9 +48,17 @@ def diagnose(calibration: RigCalibration) -> tuple[Finding, ...]:
 def _check_clicks(calibration: RigCalibration) -> Iterator[Finding]:
     """Report clicked points that fit much worse than clicks are accurate."""
     adjusted, sides = calibration.adjustment, [max(camera.size) for camera in calibration.rig]
+    most_px = max(_MISFIT_PX, _MISFIT_SHARE * float(np.mean(sides)))
     for i, source in enumerate(adjusted.sources):
         rms_px = adjusted.rms_px(source=i)
-        if source.name in calibration.inputs.points and rms_px > max(_MISFIT_PX, _MISFIT_SHARE * float(np.mean(sides))):
+        if source.name not in calibration.inputs.points or rms_px <= most_px:
+            continue
+        of_net = source.name == "court" and check_net(
+            calibration.rig, calibration.inputs.points[source.name], most_px=most_px
+        )
+        if of_net:
+            yield from of_net
+        else:
             yield Finding(
                 kind="misfit",
                 what=f"{source.name}: the points fit to {rms_px:.1f} px only, and clicks are good to 1 or 2 px",

@@ -113,8 +113,6 @@ def _check_header(path: Path, header: Sequence[str], *, needs_world: bool) -> tu
     if twice:
         raise CalibrationError(f"{path}: column '{twice[0]}' stands twice in the header; name each column once")
     missing = [name for name in ("point", *_WORLD_COLUMNS) if name not in header and (needs_world or name == "point")]
-    if missing and len(header) == 1 and ";" in header[0]:
-        raise CalibrationError(f"{path}: columns are separated by semicolons; save it with commas and decimal points")
     if missing:
         raise CalibrationError(f"{path}: no column {', '.join(missing)}; found {','.join(header)[:80]}; {_EXPECTED}")
     others = [name for name in header if name not in ("point", *_WORLD_COLUMNS)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ _MOST_SD_S = 0.03  # events with a larger standard deviation are not reported
 _NEAR_S = 0.06  # from an event, chosen: three frames of 60 images a second on either side
 _SLOWEST_FALL_M_S2 = -5.0  # about half of gravity: a body that falls more slowly is supported
 _LEAST_FALL_M_S2 = -1.0  # chosen: a jump filmed at three times the stated rate falls at 9.81 / 9
-_CLEAR_SDS = 4.0  # chosen: of an acceleration, by which it may be steeper, or must be steep
+_CLEAR_SDS = 2.0  # chosen: of an acceleration, by which it may be steeper, or must be steep
 _ANKLE_RISE_M = {True: (0.09, 0.02), False: (0.06, 0.025)}  # at take-off, at landing: mean, standard deviation
 _FOREFOOT_RISE_M = {True: (0.02, 0.01), False: (0.012, 0.01)}  # the toes are the last to leave
 _STANDING_WINDOW_S, _STANDING_QUANTILE = 0.25, 0.2  # means over such windows; quantile of them that is standing
@@ -54,6 +55,14 @@ class FlightPosterior:
         return self.parabola[:, 1] - GRAVITY_M_S2 * (at_s - self.origin_s)
 
 
+class Fall(NamedTuple):
+    """The centre of mass in a run of rows as a parabola of any acceleration; NaN where fewer than five are known."""
+
+    acceleration_m_s2: float  # upward
+    sd_m_s2: float  # by the stated errors
+    noise: float  # mean square of the residuals over what is stated
+
+
 def standing_height(time_s: Array, height_m: Array) -> float:
     """Return the height of a foot joint while the foot stands flat [m]; NaN where never known.
 
@@ -65,7 +74,7 @@ def standing_height(time_s: Array, height_m: Array) -> float:
 
 def find_flights(track: LegTrack) -> tuple[tuple[int, int], ...]:
     """Return the first and last row of each flight: both ankles high, and the body in free fall."""
-    return tuple(run for run in _airborne_runs(track) if _may_fall_freely(*_acceleration(track, run)))
+    return tuple(run for run in _airborne_runs(track) if _may_fall_freely(measure_fall(track, run)))
 
 
 def find_slow_falls(track: LegTrack) -> tuple[tuple[int, int, float], ...]:
@@ -75,10 +84,25 @@ def find_slow_falls(track: LegTrack) -> tuple[tuple[int, int, float], ...]:
     """
     slow = []
     for first, last in _airborne_runs(track):
-        g, sd = _acceleration(track, (first, last))
-        if not _may_fall_freely(g, sd) and g + _CLEAR_SDS * sd < _LEAST_FALL_M_S2:
-            slow.append((first, last, -g))
+        fall = measure_fall(track, (first, last))
+        fastest_up = fall.acceleration_m_s2 + _CLEAR_SDS * fall.sd_m_s2
+        if not _may_fall_freely(fall) and fastest_up < _LEAST_FALL_M_S2:
+            slow.append((first, last, -fall.acceleration_m_s2))
     return tuple(slow)
+
+
+def measure_fall(track: LegTrack, rows: tuple[int, int]) -> Fall:
+    """Fit a parabola to the centre of mass from a first to a last row."""
+    time_s, height, variance = _centre_of_mass_heights(track, rows[0], rows[1] + 1)
+    if len(time_s) < 5:
+        return Fall(np.nan, np.nan, np.nan)
+    weight = np.linalg.inv(noise_covariance(time_s, variance, sway_m=SWAY_M))
+    terms = np.vander(time_s - time_s.mean(), 3)
+    covariance = np.linalg.inv(terms.T @ weight @ terms)
+    solution = covariance @ terms.T @ weight @ height
+    residual = height - terms @ solution
+    noise = float(residual @ weight @ residual) / (len(time_s) - 3)
+    return Fall(float(2 * solution[0]), 2 * float(np.sqrt(covariance[0, 0])), noise)
 
 
 def _airborne_runs(track: LegTrack) -> list[tuple[int, int]]:
@@ -169,22 +193,8 @@ def _belongs_to_run(track: LegTrack, smooth: Array, last: int, row: int) -> bool
     return bool(gap_s <= (_BRIDGE_S if is_gap else _DIP_S))
 
 
-def _acceleration(track: LegTrack, rows: tuple[int, int]) -> tuple[float, float]:
-    """Return the centre of mass's upward acceleration in a run of rows, and its sd [m/s2].
-
-    NaN where fewer than five frames are known.
-    """
-    time_s, height, variance = _centre_of_mass_heights(track, rows[0], rows[1] + 1)
-    if len(time_s) < 5:
-        return np.nan, np.nan
-    weight = np.linalg.inv(noise_covariance(time_s, variance, sway_m=SWAY_M))
-    terms = np.vander(time_s - time_s.mean(), 3)
-    covariance = np.linalg.inv(terms.T @ weight @ terms)
-    return float(2 * (covariance @ terms.T @ weight @ height)[0]), float(np.sqrt(covariance[0, 0]))
-
-
-def _may_fall_freely(acceleration: float, sd: float) -> bool:
-    return acceleration - _CLEAR_SDS * sd < _SLOWEST_FALL_M_S2
+def _may_fall_freely(fall: Fall) -> bool:
+    return fall.acceleration_m_s2 - _CLEAR_SDS * fall.sd_m_s2 < _SLOWEST_FALL_M_S2
 
 
 def _centre_of_mass_heights(track: LegTrack, start: int, stop: int) -> tuple[Array, Array, Array]:
@@ -275,8 +285,8 @@ def _normalise(log_p: Array) -> Array:
 
 
 def _reject_unseen(track: LegTrack, draws: Array | None) -> Array | None:
-    """Return draws of an event's time; None where they are far apart, or no frame near is seen by two cameras."""
+    """Return draws of an event's time; None where they are far apart, or no frame near has a tracked ankle."""
     if draws is None or float(np.std(draws)) > _MOST_SD_S:
         return None
     is_near = np.abs(track.time_s - draws.mean()) <= _NEAR_S
-    return draws if track.is_measured[is_near].any() else None
+    return draws if track.is_ankle_tracked[is_near].any() else None

@@ -33,6 +33,7 @@ class LegTrack:
     is_uncertain: NDArray[np.bool_]  # (n,) hips, knees or ankles, according to the tracker
     are_hips_uncertain: NDArray[np.bool_]  # (n,)
     is_measured: NDArray[np.bool_]  # (n,) by two cameras or more, or tracked; nowhere if no frame is tracked
+    is_ankle_tracked: NDArray[np.bool_]  # (n,) left or right
     hips: Array  # (n, 2, 3)
     knees: Array  # (n, 2, 3)
     ankles: Array  # (n, 2, 3)
@@ -94,7 +95,7 @@ def extract_legs(motion: PlayersMotion, player: str) -> LegTrack:
             is_stated = np.isfinite(variance) & (variance > 0)
             variance = np.where(is_stated, variance, _UNKNOWN_SD_M**2)
             parts[part] = _remove_spikes(motion.points[:, who][:, at], variance), variance
-    hips = [motion.joints.index(f"hip_{side}") for side in ("left", "right")]
+    hips, ankles = ([motion.joints.index(f"{part}_{side}") for side in ("left", "right")] for part in ("hip", "ankle"))
     keys = {"hip": "hips", "knee": "knees", "ankle": "ankles", "foot": "forefeet", "wrist": "wrists"}
     return LegTrack(
         player=player,
@@ -102,6 +103,7 @@ def extract_legs(motion: PlayersMotion, player: str) -> LegTrack:
         time_s=motion.time_s,
         is_uncertain=motion.status[:, who] == Status.UNCERTAIN.value,
         are_hips_uncertain=worst_of(motion.joint_status[:, who, hips]) == Status.UNCERTAIN.value,
+        is_ankle_tracked=(motion.joint_status[:, who, ankles] == Status.TRACKED.value).any(axis=1),
         is_measured=_is_measured(motion, who),
         hips=parts["hip"][0],
         knees=parts["knee"][0],
