@@ -217,9 +217,8 @@ def best_time_shift(
         return 0.0, unshifted_mm
     period, best = float(np.median(np.diff(time_s))), (0.0, unshifted_mm)
     shifted = {step: error_at(step * period) for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1)}
-    n_unshifted = shifted[0][1]
     for step, (error_mm, n) in shifted.items():
-        if n >= _MOST_FRAMES * n_unshifted and error_mm < min(best[1], clearly_better * unshifted_mm):
+        if n >= _MOST_FRAMES * shifted[0][1] and error_mm < min(best[1], clearly_better * unshifted_mm):
             best = step * period, error_mm
     return best
 

@@ -19,7 +19,7 @@ from airborne.video.gaps import describe_gaps
 from airborne.video.lazy import ConversionCache, lazy_view
 from airborne.video.outages import N_LISTED
 from airborne.video.prefetch import read_ahead
-from airborne.video.repeats import PictureChanges
+from airborne.video.repeats import PictureChanges, describe_repeat
 from airborne.video.sizes import check_sizes
 from airborne.video.undistortion import Undistortion, undistortion_of
 
@@ -119,9 +119,8 @@ class Recording:
         delay_s = float(image.time_s - time_s)
         if self.is_lazy:
             return replace(lazy_view(image, facts, undistortions[image.parity], conversions), delay_s=delay_s)
-        rgb = rgb_from_decoded(image, facts)
-        if image.parity is not None and self.fields_as == "interpolated":
-            rgb = fill_rows(rgb, image.parity, facts.size[1])
+        rgb, is_filled = rgb_from_decoded(image, facts), self.fields_as == "interpolated"
+        rgb = fill_rows(rgb, image.parity, facts.size[1]) if is_filled and image.parity is not None else rgb
         return replace(undistortions[image.parity].view(rgb), delay_s=delay_s)
 
     def _decode_on_clock(self, source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
@@ -146,22 +145,16 @@ class Recording:
             )
 
     def _note_repeated(self, source: VideoSource, file_s: Fraction) -> None:
-        time_s = source.trial_time(file_s)
-        frame = round((time_s - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
-        self._note(
-            f"{source.name}: frame {frame} ({float(time_s):.3f} s) repeats the picture before it: if the camera filmed "
-            "on, its pictures are late from there; take the repeated one out of the video"
-        )
+        time_s, start_s = source.trial_time(file_s), self.sources[0].trial_time(Fraction(0))
+        frame = round((time_s - start_s) * self.facts[0].image_rate)
+        self._note(describe_repeat(source.name, frame, time_s))
 
     def _note_gap(self, name: str, from_s: Fraction, to_s: Fraction) -> None:
-        """Note a gap in the one line that says all of a camera's."""
+        """Note a gap in the line that says all of a camera's."""
         gaps = self._gaps.setdefault(name, {})
-        before = describe_gaps(name, gaps) if gaps else None
+        self.events[:] = [event for event in self.events if not gaps or event != describe_gaps(name, gaps)]
         gaps[from_s] = to_s
-        if before in self.events:
-            self.events[self.events.index(before)] = describe_gaps(name, gaps)
-        else:
-            self.events.append(describe_gaps(name, gaps))
+        self._note(describe_gaps(name, gaps))
 
     def _note(self, event: str) -> None:
         if event not in self.events:  # a recording may be read twice

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -12,8 +13,8 @@ from airborne.types import Array
 from airborne.video.decoding import DecodedImage
 from airborne.video.pixels import plane_rows
 
-_EVERY_PX = 4  # of a picture's rows and columns that are compared
-_PERCENTILE = 99.8  # of the changes of its samples: a body covers a hundredth of a picture or less
+_N_SAMPLES = 16_000  # chosen: of a picture that are compared, whatever its size
+_SHARE_BELOW = 0.998  # chosen: of the changes of its samples; a body covers a hundredth of a picture or less
 # chosen, and looked at on six synthetic throws and somersaults, in one with a picture repeated: from one picture to the
 # next the body changes its samples by 18 to 118 grey levels, a repeated and compressed one by up to 1
 _LEAST_GREY, _STILL = 16.0, 0.25  # change by which something moves; and share of that beside which is none
@@ -43,7 +44,9 @@ class PictureChanges:
         if before is None or now is None or before.shape != now.shape:
             self._last = []
             return None
-        change = float(np.percentile(np.abs(now - before), _PERCENTILE))
+        changes = np.abs(now - before).ravel()
+        rank = int(_SHARE_BELOW * (len(changes) - 1))
+        change = float(np.partition(changes, rank)[rank])
         self._last = [*self._last[-2:], change]
         self._n, self._n_changed = self._n + 1, self._n_changed + (change > 0)
         least = min(self._last[0], change)
@@ -62,4 +65,13 @@ def _samples_of(frame: av.VideoFrame) -> Array | None:
         return None
     n_bytes = frame.format.padded_bits_per_pixel // 8 if len(frame.planes) == 1 else 1  # of a pixel
     rows = plane_rows(frame.planes[0])[:, : n_bytes * frame.width]  # without padding, which holds anything
-    return rows[::_EVERY_PX, ::_EVERY_PX].astype(np.float32)
+    every = max(math.isqrt(frame.width * frame.height // _N_SAMPLES), 1)
+    return rows[::every, ::every].astype(np.int16)
+
+
+def describe_repeat(name: str, frame: int, time_s: Fraction) -> str:
+    """Say which frame of a camera repeats the one before, and what that means."""
+    return (
+        f"{name}: frame {frame} ({float(time_s):.3f} s) repeats the picture before it: if the camera filmed on, its "
+        "pictures are late from there; take the repeated one out of the video"
+    )

@@ -14,9 +14,9 @@ from airborne.motion.jumps.leg_track import extract_legs
 from airborne.motion.players import PlayersMotion
 from airborne.tracking.self_check.path import alarm
 
-# how legs and hips, weighed as `LegTrack` does, fall, alike in all flights, as players move arms and trunk alike. Chosen
-# between the truths of synthetic blocks 5, 11, 41 and 42, 9.55 to 9.88 m/s2 (spikers beside at 10.2), and a jumper whose
-# arms and trunk keep still, 10.55
+# how legs and hips, weighed as `LegTrack` does, fall, alike in all flights, as players move arms and trunk alike.
+# Chosen between the truths of synthetic blocks 5, 11, 41 and 42, 9.55 to 9.88 m/s2 (spikers beside at 10.2), and a
+# jumper whose arms and trunk keep still, 10.55
 _EXPECTED_M_S2, _LIMBS_SD_M_S2 = 10.05, 0.25
 _CLEAR_SDS = 3.0  # chosen: as of a body, one in 370 right recordings is accused
 
