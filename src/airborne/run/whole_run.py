@@ -40,7 +40,7 @@ from airborne.video.rereading import Rereading
 # frames whose poses are fitted at once, and those that are fitted with them on either side: memory stays flat
 _WINDOW, _MARGIN = 256, 16
 _N_THREADS = min(os.cpu_count() or 1, 8)  # the kernels let go of Python's lock; each holds the images of a time
-# of a skin whose texture is learned from look to look: of 4, 6 and 8 the one after which three synthetic people whose
+# of a skin whose texture is learned from look to look: of 4, 6 and 8 the one after which two synthetic people whose
 # joints lie elsewhere, and whose clothes end within segments, gain no more
 _N_TEXTURE_STEPS = 6
 _MOST_BYTES = 6e8  # of pictures held at once; others are decoded again for every step

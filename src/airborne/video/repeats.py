@@ -8,12 +8,12 @@ from fractions import Fraction
 
 import av
 import numpy as np
+from numpy.typing import NDArray
 
-from airborne.types import Array
 from airborne.video.decoding import DecodedImage
 from airborne.video.pixels import plane_rows
 
-_N_SAMPLES = 16_000  # chosen: of a picture that are compared, whatever its size
+_N_SAMPLES = 8_000  # chosen: of a picture that are compared, whatever its size
 _SHARE_BELOW = 0.998  # chosen: of the changes of its samples; a body covers a hundredth of a picture or less
 # chosen, and looked at on six synthetic throws and somersaults, in one with a picture repeated: from one picture to the
 # next the body changes its samples by 18 to 118 grey levels, a repeated and compressed one by up to 1
@@ -26,7 +26,7 @@ class PictureChanges:
     """How much each picture of a video differs from the one before; fields of one picture count once."""
 
     _frame: av.VideoFrame | None = None
-    _samples: Array | None = None
+    _samples: NDArray[np.int16] | None = None
     _time_s: Fraction = Fraction(0)
     _last: list[float] = field(default_factory=list)  # up to three changes [grey levels]
     _n: int = 0
@@ -59,7 +59,7 @@ class PictureChanges:
         return self._n >= _FEWEST and self._n_changed <= _MOST_CHANGED * self._n
 
 
-def _samples_of(frame: av.VideoFrame) -> Array | None:
+def _samples_of(frame: av.VideoFrame) -> NDArray[np.int16] | None:
     """Return some samples of a picture's first plane, of its brightness in most formats; None beyond 8 bits."""
     if any(component.bits != 8 for component in frame.format.components):
         return None
