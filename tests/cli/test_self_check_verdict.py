@@ -1,4 +1,4 @@
-"""What the self-check is surer of than three deviations is said, even where it is too little for an alarm."""
+"""What the self-check is surer of than three deviations is named as wrong, however small it is."""
 
 import re
 import shutil
@@ -18,4 +18,5 @@ def test_a_body_that_is_a_little_too_large_is_not_called_right(thrown_cross, tmp
     body.write_text(text, encoding="utf-8")
     assert in_process("track", tmp_path / "trial" / "trial.toml", "-o", tmp_path / "run", "--no-pictures") == 0
     said = capsys.readouterr().out
-    assert re.search(r"nothing is surely wrong, but the body looks 3\.\d ± 0\.\d % smaller than its file says", said)
+    assert "something is wrong" in said
+    assert re.search(r"the body looks 3\.\d ± 0\.\d % smaller than its file says", said)

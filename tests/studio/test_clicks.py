@@ -51,7 +51,7 @@ def test_surveys_are_told_from_other_tables(tmp_path):
         (SURVEY.replace("2.0", "two"), "survey.csv, row 3 (point 'P2'), column y_m: 'two' is not a number; correct it"),
         (SURVEY.replace("1.25", ""), "survey.csv, point 'P1', column y_m: nothing stands there; expected metres"),
         ("point,x_m,y_m,z_m,a_u,a_v\nP1,0,0,0,3,\n", "survey.csv, point 'P1': only one of a_u and a_v is there"),
-        (SURVEY.replace(",", ";"), "survey.csv: found header point;x_m;y_m;z_m"),
+        (SURVEY.replace(",", ";"), "survey.csv: columns are separated by semicolons; save it with commas"),
         (SURVEY.replace("_m", ""), "survey.csv has no columns x_m, y_m, z_m; expected surveyed points"),
         ("point,x_m,y_m,z_m\n", "survey.csv: found header point,x_m,y_m,z_m and 0 rows"),
     ],

@@ -91,7 +91,8 @@ def name_causes(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior
         clear = {
             n: score
             for n, score in scores.items()
-            if (score > _LEAST_EVIDENCE and _is_clear(solution, n, widen(prior, n))) or _is_clear(solution, n, prior)
+            if (score > _LEAST_EVIDENCE and _is_clear(solution, n, widen(prior, n)))
+            or (n.size == 1 and _is_clear(solution, n, prior))  # a norm of three numbers is never near zero
         }
         if not clear:
             break
