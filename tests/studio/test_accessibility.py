@@ -14,7 +14,7 @@ from tests.support.person_run import PERSON, PERSON_TABLE, write_person_run
 from tests.support.studio import fork_studio
 
 VIDEO, N = (320, 240), 6  # [px], pictures
-SIZES = ((1024, 700), (1280, 720), (3840, 2160))  # of the window
+SIZES = ((1024, 700), (3840, 2160))  # of the window, the smallest and the largest
 PAGES = {  # and what is there when a page is built
     "": "Use these cameras", "sync": "Same event", "cameras": "focal length", "body": "Use this person",
     "ruler": "How long", "thing": "Use this thing", "start": "Place it by hand", "track": "Track again",
