@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -36,9 +36,9 @@ from airborne.evaluation import compare_joints, read_joint_paths
 from airborne.motion import Motion
 from airborne.motion.run_folder import read_body_run
 from airborne.run.track import track_trial
-from airborne.synthetic import Scene, Takeoff, fly_articulated, gym, write_trial
+from airborne.synthetic import Scene, Takeoff, gym, write_trial
 from airborne.synthetic.flight.articulated import joint_motion, mass_at_angles
-from airborne.synthetic.flight.rigid import SampledFlight
+from airborne.synthetic.flight.somersault import Skill
 from airborne.synthetic.throw.scene import HALL_AMBIENT, hall_spots
 from airborne.trial.body import BodyTable
 from airborne.trial.file import Trial, read_trial
@@ -46,23 +46,10 @@ from airborne.trial.start import StartTable
 from airborne.types import Array
 
 SEEDS = (901, 902, 903, 904)  # on which the number of steps with a texture was chosen
-DURATION_S, RATE_HZ, CLICK_SD_M = 1.05, 60, 0.015
+DURATION_S, RATE_HZ, CLICK_SD_M = 1.05, 60, 0.015  # chosen: about those of the recorded somersaults
 _HIDDEN = ("pelvis", "neck", "torso")  # landmarks that nobody clicks
 _SKIN_SRGB, _HAIR_SRGB, _WHITE = np.array([206.0, 165.0, 138.0]), np.array([60.0, 42.0, 32.0]), np.full(3, 240.0)
-_TUCK_DEG = {"thigh": -105, "shank": 110, "torso": 28, "chest": 16}  # about x, of a deep tuck
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Flight:
-    """A person's true motion."""
-
-    bones: BodyModel
-    takeoff: Takeoff
-    joints: object
-
-    def __call__(self, time_s: Array) -> SampledFlight:
-        """Return the motion at the times (n,) [s]."""
-        return fly_articulated(self.bones, self.takeoff, self.joints, time_s)  # pyright: ignore[reportArgumentType]
+_TUCK_DEG = {"thigh": -105, "shank": 110, "torso": 28, "chest": 16}  # chosen: about x, of a deep tuck
 
 
 def person(seed: int) -> tuple[BodyModel, BodyModel, BodyTable]:
@@ -190,7 +177,8 @@ def record(seed: int, folder: Path) -> Trial:
         R=Rotation.from_rotvec(rng.normal(0, 0.08, 3)).as_matrix(),
         angular_momentum=np.array([rng.choice([-1, 1]) * rng.uniform(2.2, 3.6) * upright, 0, 0]),
     )
-    flight = Flight(bones, takeoff, joint_motion(DURATION_S * np.array(shares), np.array(poses)))
+    joints = joint_motion(DURATION_S * np.array(shares), np.array(poses))
+    flight = Skill(model=bones, takeoff=takeoff, joints=joints, duration_s=DURATION_S)
     scene = Scene(
         name=f"person {seed}",
         seed=seed,
@@ -209,12 +197,12 @@ def record(seed: int, folder: Path) -> Trial:
     )
     write_trial(scene, folder)
     at_start = bones.with_pose(flight(np.zeros(1)).pose(0)).landmarks
-    joints = {
+    clicked = {
         mark.name: (at + rng.normal(0, CLICK_SD_M, 3)).tolist()
         for mark, at in zip(bones.landmarks, at_start, strict=True)
         if mark.name not in _HIDDEN
     }
-    update = {"body": known, "start": StartTable(frame=0, joints_m=joints)}
+    update = {"body": known, "start": StartTable(frame=0, joints_m=clicked)}
     return read_trial(folder / "trial.toml").model_copy(update=update)
 
 

@@ -84,7 +84,7 @@ def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: l
     own = _agreements(images, silhouettes)
     clear = [max(_LEAST_AGREEMENT, each / _MOST_OF_IT) for each in own]
     findings, right = [], list(images)
-    for mix_up, crossed in sorted(_crossed(images, silhouettes), key=lambda each: -min(each[1])):
+    for mix_up, crossed in sorted(_agreements_without(images, silhouettes), key=lambda each: -min(each[1])):
         concerned = mix_up.cameras
         is_new = all(right[i] is images[i] for i in concerned)
         if is_new and all(other >= clear[i] for i, other in zip(concerned, crossed, strict=True)):
@@ -97,7 +97,9 @@ def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: l
     return findings if findings and np.mean(explained) >= _LEAST_EXPLAINED else []
 
 
-def _crossed(images: Sequence[Mask | None], silhouettes: Sequence[Mask]) -> Iterator[tuple[MixUp, list[float]]]:
+def _agreements_without(
+    images: Sequence[Mask | None], silhouettes: Sequence[Mask]
+) -> Iterator[tuple[MixUp, list[float]]]:
     """Yield each possible mix-up with the agreement of its cameras' images without it."""
     for mix_up in possible_mix_ups(len(images)):
         yield mix_up, _agreements(mix_up.undo_images(images), [silhouettes[i] for i in mix_up.cameras])
@@ -118,16 +120,16 @@ class MixUp:
     def describe(self, names: Sequence[str]) -> str:
         """Return how its images would be right, by the rig's names."""
         of = join_names([names[i] for i in self.cameras])
-        return f"the images of {of} {'exchanged' if self.is_exchange else self._flipped}"
+        return f"the images of {of} {'exchanged' if self.is_exchange else self._remedy}"
 
     def how(self, names: Sequence[str]) -> str:
         """Return how the first of its cameras agrees, by the rig's names."""
         if self.is_exchange:
             return f"in that of {names[self.cameras[1]]}, whose video fits in turn"
-        return f"once it is {self._flipped}"
+        return f"once it is {self._remedy}"
 
     @property
-    def _flipped(self) -> str:
+    def _remedy(self) -> str:
         return "turned by 180°" if self.is_turned else "mirrored"
 
     def _flip(self, image: NDArray[Any]) -> NDArray[Any]:
@@ -185,7 +187,7 @@ def undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyM
 
     return [
         mix_up
-        for mix_up, crossed in _crossed(foregrounds, silhouettes)
+        for mix_up, crossed in _agreements_without(foregrounds, silhouettes)
         if all(
             own[i] < other or (own[i] == other and not mix_up.is_turned)
             for i, other in zip(mix_up.cameras, crossed, strict=True)

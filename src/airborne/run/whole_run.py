@@ -40,8 +40,8 @@ from airborne.video.rereading import Rereading
 # frames whose poses are fitted at once, and those that are fitted with them on either side: memory stays flat
 _WINDOW, _MARGIN = 256, 16
 _N_THREADS = min(os.cpu_count() or 1, 8)  # the kernels let go of Python's lock; each holds the images of a time
-# of a skin whose texture is learned from look to look: of 4, 6 and 8 the one after which two synthetic people whose
-# joints lie elsewhere, and whose clothes end within segments, gain no more
+# chosen, of a skin whose texture is learned from look to look: of 4, 6 and 8 the one after which two synthetic people
+# whose joints lie elsewhere, and whose clothes end within segments, gain no more
 _N_TEXTURE_STEPS = 6
 _MOST_BYTES = 6e8  # of pictures held at once; others are decoded again for every step
 
@@ -194,9 +194,9 @@ class _RunImages:
     ) -> ImageEvidence:
         """Return what the images of a time say about the last pose of a path; called by `_N_THREADS` at once."""
         surface = self.surfaces.pop()  # its workspace serves one thread
-        patches = {"shown": shown} if self.has_texture else {}
+        taught = shown if self.has_texture else None
         try:
-            found = self.tracker.linearise(self.learned, frames, path, misfit, surface=surface, **patches)
+            found = self.tracker.linearise(self.learned, frames, path, misfit, surface=surface, shown=taught)
         finally:
             self.surfaces.append(surface)
         return _tracked_evidence(tracked, path[-1][1], found) if frames.index in self.keys else found

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from airborne.constants import GRAVITY_M_S2
+from airborne.constants import ALARM_SDS, GRAVITY_M_S2
 from airborne.motion.jumps.events import find_flights, measure_fall
 from airborne.motion.jumps.heights import LEAST_RATE_HZ
 from airborne.motion.jumps.leg_track import extract_legs
@@ -18,7 +18,6 @@ from airborne.tracking.self_check.path import alarm
 # Chosen between the truths of synthetic blocks 5, 11, 41 and 42, 9.55 to 9.88 m/s2 (spikers beside at 10.2), and a
 # jumper whose arms and trunk keep still, 10.55
 _EXPECTED_M_S2, _LIMBS_SD_M_S2 = 10.05, 0.25
-_CLEAR_SDS = 3.0  # chosen: as of a body, one in 370 right recordings is accused
 
 
 class Gravity(NamedTuple):
@@ -30,7 +29,7 @@ class Gravity(NamedTuple):
     @property
     def is_wrong(self) -> bool:
         """Whether it clearly differs from what a right one is, whatever arms and trunk do."""
-        return abs(self.value_m_s2 - _EXPECTED_M_S2) > _CLEAR_SDS * self.sd_m_s2
+        return abs(self.value_m_s2 - _EXPECTED_M_S2) > ALARM_SDS * self.sd_m_s2
 
     @property
     def sentence(self) -> str:

@@ -21,7 +21,7 @@ from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
 
-# of a patch: with 30 and 90 mm two synthetic people, whose clothes end within segments, are tracked alike
+# chosen, of a patch: with 30 and 90 mm two synthetic people, whose clothes end within segments, are tracked alike
 _SIZE_M = 0.05
 _FEWEST_PX = 5  # chosen: of a patch in an image
 _FEWEST_IMAGES = 3  # chosen, as a median needs: that show a patch; with fewer it keeps its cloth's colour
