@@ -197,7 +197,7 @@ def image_evaluator(
             noise_of_views.append(float(image.noise_px * of_view[1] / of_view[2]) if of_view[2] > 0 else 1.0)
             shifted.append((sums.B * image.shift_sds_px).transpose(2, 0, 1))
         if dofs.moves_joints:
-            shifted.append(shape_error_gradients(sums.A))
+            shifted.append(shape_error_gradients(sums.A, posed))
         return map_to_dofs(
             render_model,
             dofs,
