@@ -47,6 +47,7 @@ class Recording:
     events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
     _gaps: dict[str, dict[Fraction, Fraction]] = field(default_factory=dict)  # of each camera, from -> to [s]
     _known: dict[tuple[str, bool], tuple[Camera, dict[int | None, Undistortion]]] = field(default_factory=dict)
+    _changes: dict[str, PictureChanges] = field(default_factory=dict)  # of each camera's pictures, looked at once
 
     @property
     def rate(self) -> Fraction:
@@ -126,13 +127,13 @@ class Recording:
     def _decode_on_clock(self, source: VideoSource, facts: VideoFacts) -> Generator[DecodedImage]:
         """Yield a camera's images on the trial's clock, and note every gap and an early end."""
         period_s = 1 / facts.image_rate
-        expected_s, changes, n_repeated = source.trial_time(Fraction(0)), PictureChanges(), 0
+        expected_s, changes = source.trial_time(Fraction(0)), self._changes.setdefault(source.name, PictureChanges())
         with closing(read_ahead(decode(source, facts))) as stream:
             for image in stream:
                 time_s = source.trial_time(image.time_s)
                 if time_s > expected_s + period_s / 2:
                     self._note_gap(source.name, expected_s, time_s)
-                if (repeated_s := changes.add(image)) is not None and (n_repeated := n_repeated + 1) <= N_LISTED:
+                if (repeated_s := changes.add(image)) is not None and changes.n_repeated <= N_LISTED:
                     self._note_repeated(source, repeated_s)
                 yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
@@ -146,8 +147,7 @@ class Recording:
 
     def _note_repeated(self, source: VideoSource, file_s: Fraction) -> None:
         time_s, start_s = source.trial_time(file_s), self.sources[0].trial_time(Fraction(0))
-        frame = round((time_s - start_s) * self.facts[0].image_rate)
-        self._note(describe_repeat(source.name, frame, time_s))
+        self._note(describe_repeat(source.name, round((time_s - start_s) * self.facts[0].image_rate), time_s))
 
     def _note_gap(self, name: str, from_s: Fraction, to_s: Fraction) -> None:
         """Note a gap in the line that says all of a camera's."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 import av
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,11 +24,15 @@ _FEWEST, _MOST_CHANGED = 10, 0.1  # chosen: pictures of a still video at least; 
 
 @dataclass(slots=True, eq=False)
 class PictureChanges:
-    """How much each picture of a video differs from the one before; fields of one picture count once."""
+    """How much each picture of a video differs from the one before; fields of one picture count once.
 
+    A video may be read again: pictures up to the last one that was added are known already.
+    """
+
+    n_repeated: int = 0
     _frame: av.VideoFrame | None = None
-    _samples: NDArray[np.int16] | None = None
-    _time_s: Fraction = Fraction(0)
+    _samples: NDArray[np.uint8] | None = None
+    _time_s: Fraction | None = None
     _last: list[float] = field(default_factory=list)  # up to three changes [grey levels]
     _n: int = 0
     _n_changed: int = 0
@@ -37,20 +42,21 @@ class PictureChanges:
 
         It does where next to nothing changes from one to the other, but does before and after.
         """
-        if image.frame is self._frame:
+        if image.frame is self._frame or (self._time_s is not None and image.time_s <= self._time_s):
             return None
         before, now, before_s = self._samples, _samples_of(image.frame), self._time_s
         self._frame, self._samples, self._time_s = image.frame, now, image.time_s
         if before is None or now is None or before.shape != now.shape:
             self._last = []
             return None
-        changes = np.abs(now - before).ravel()
-        rank = int(_SHARE_BELOW * (len(changes) - 1))
-        change = float(np.partition(changes, rank)[rank])
+        changes = cv2.absdiff(now, before).ravel()
+        counts = np.bincount(changes, minlength=256).cumsum()
+        change = float(counts.searchsorted(int(_SHARE_BELOW * (len(changes) - 1)), side="right"))
         self._last = [*self._last[-2:], change]
         self._n, self._n_changed = self._n + 1, self._n_changed + (change > 0)
         least = min(self._last[0], change)
         is_repeated = len(self._last) == 3 and least >= _LEAST_GREY and self._last[1] < _STILL * least
+        self.n_repeated += is_repeated
         return before_s if is_repeated else None
 
     @property
@@ -59,14 +65,14 @@ class PictureChanges:
         return self._n >= _FEWEST and self._n_changed <= _MOST_CHANGED * self._n
 
 
-def _samples_of(frame: av.VideoFrame) -> NDArray[np.int16] | None:
+def _samples_of(frame: av.VideoFrame) -> NDArray[np.uint8] | None:
     """Return some samples of a picture's first plane, of its brightness in most formats; None beyond 8 bits."""
     if any(component.bits != 8 for component in frame.format.components):
         return None
     n_bytes = frame.format.padded_bits_per_pixel // 8 if len(frame.planes) == 1 else 1  # of a pixel
     rows = plane_rows(frame.planes[0])[:, : n_bytes * frame.width]  # without padding, which holds anything
     every = max(math.isqrt(frame.width * frame.height // _N_SAMPLES), 1)
-    return rows[::every, ::every].astype(np.int16)
+    return np.ascontiguousarray(rows[::every, ::every])
 
 
 def describe_repeat(name: str, frame: int, time_s: Fraction) -> str:
