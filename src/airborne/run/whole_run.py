@@ -216,10 +216,10 @@ class _RunImages:
         """Yield frames, which come after those that are held."""
         if not wanted:
             return
-        n_bytes, all_wanted = sum(frames.n_bytes for frames in self._held.values()), set(wanted)
+        n_bytes, all_wanted = sum(frames.n_held_bytes for frames in self._held.values()), set(wanted)
         for frames in self.reader.forward(wanted[0], wanted[-1] + 1):
             if frames.index in all_wanted:
-                n_bytes += frames.n_bytes
+                n_bytes += frames.n_held_bytes
                 if n_bytes <= _MOST_BYTES:
                     self._held[frames.index] = frames
                 yield frames

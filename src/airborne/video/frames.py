@@ -17,6 +17,11 @@ PixelBox = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]; the ends are outsid
 class LazyImage(Protocol):
     """An image that is converted to sRGB only when it is read."""
 
+    @property
+    def n_held_bytes(self) -> int:
+        """How many bytes it takes, as far as it is converted."""
+        ...
+
     def whole(self) -> Image:
         """Return the image: (h, w, 3) sRGB."""
         ...
@@ -61,3 +66,9 @@ class Frames:
     def n_bytes(self) -> int:
         """How many bytes the images take, converted."""
         return sum(3 * view.camera.size[0] * view.camera.size[1] for view in self.views if view is not None)
+
+    @property
+    def n_held_bytes(self) -> int:
+        """How many bytes they take as they are, converted or not yet."""
+        images = [view.image for view in self.views if view is not None]
+        return sum(each.nbytes if isinstance(each, np.ndarray) else each.n_held_bytes for each in images)

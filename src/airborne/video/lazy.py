@@ -25,6 +25,12 @@ class _UnconvertedImage:
     _conversions: ConversionCache
     _whole: Image | None = None
 
+    @property
+    def n_held_bytes(self) -> int:
+        """How many bytes the planes of the decoded image take, and the converted one."""
+        planes = sum(plane.buffer_size for plane in self._image.frame.planes)
+        return planes + (0 if self._whole is None else self._whole.nbytes)
+
     def whole(self) -> Image:
         """Return the undistorted image (h, w, 3) sRGB; converted once."""
         if self._whole is None:
