@@ -16,6 +16,9 @@ from airborne.types import Array
 _UNKNOWN_SD_M = 0.02  # of a joint without a covariance
 _FEWEST_VIEWS = 2  # that tell how high a joint is
 _LEAP_M = 0.05  # beyond the noise
+# of de Leva (1996), men, but for head, arms and trunk, which have 0.6782 (Winter 2009): chosen, though they sum to
+# 1.075, as what moves above the hips is not seen. With de Leva's 0.6028 take-off errs by 0.6 to 1.0 frames on noisy
+# synthetic blocks instead of 0.2 to 0.5 (benchmarks/accuracy/jumps.py)
 _MASS_SHARES = {
     "hip": 0.6782 + 0.2832 * 0.5905,
     "knee": 0.2832 * 0.4095 + 0.0866 * 0.5605,
@@ -60,7 +63,7 @@ class LegTrack:
     def centre_of_mass_height(self) -> tuple[Array, Array]:
         """Height of the centre of mass up to a constant (n,) [m], and its variance.
 
-        Trunk, arms and head move with the hips; segment masses are de Leva's (1996) for men.
+        Trunk, arms and head move with the hips.
         """
         parts = {"hip": (self.hips, "hips"), "knee": (self.knees, "knees"), "ankle": (self.ankles, "ankles")}
         height = sum(_MASS_SHARES[name] * points[:, :, 2].mean(axis=1) for name, (points, _) in parts.items())
