@@ -121,7 +121,7 @@ def test_steady_motion_has_no_acceleration_but_gravity():
 def test_noise_of_single_frames_is_less_after(falls):
     tracked = shake(TRUTH)
     fitted = fit_run(HUMAN, tracked, TIME_S, [Stretch(slice(0, N), falls)], seen(tracked)).poses
-    assert off_m(fitted) < 0.6 * off_m(tracked)
+    assert off_m(fitted) < 0.7 * off_m(tracked)
 
 
 def test_a_free_fall_tells_where_the_body_is():
