@@ -15,6 +15,7 @@ set_up_libraries()  # as the command line does
 
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
+from tests.support.once import remember_foregrounds
 from tests.support.places import ROOT
 
 SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
@@ -91,6 +92,13 @@ def pytest_sessionfinish(session, exitstatus):
 def pytest_terminal_summary(terminalreporter, config):
     """Remember what was skipped."""
     config.cache.set(SKIPPED, [report.nodeid for report in terminalreporter.stats.get("skipped", [])])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _foregrounds():
+    with pytest.MonkeyPatch.context() as patch:
+        remember_foregrounds(patch)
+        yield
 
 
 @pytest.fixture(scope="session")
