@@ -15,7 +15,7 @@ from tests.support.browser import open_page
 from tests.support.places import THROWN_CROSS
 from tests.support.studio import at_pixel, fork_studio, kill_studio
 
-OLD_S, BUSY_S = 2.0, (0.5, 4.0)  # what may be lost; how much longer someone works until the studio is killed
+OLD_S, BUSY_S = 2.0, (0.3, 1.5)  # what may be lost; how much longer someone works until the studio is killed
 PATIENCE_MS = 5000  # with a studio that may be killed
 AGAIN_MS = 8000  # after which a click is lost
 STEP_PX, PANE = 12.0, 0  # of each drag, to the right in this camera's picture
