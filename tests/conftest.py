@@ -1,5 +1,6 @@
 """What every test may use, the order in which test files start, and which tests are quick."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -75,6 +76,11 @@ def pytest_collection_modifyitems(config, items):
         skipped = skipped_before(config)
         config.hook.pytest_deselected(items=[item for item in items if item.nodeid not in skipped])
         items[:] = [item for item in items if item.nodeid in skipped]
+
+
+def pytest_collection_finish():
+    """Let no later look for garbage go through all tests and what they have imported, which stay."""
+    gc.freeze()
 
 
 @pytest.hookimpl(hookwrapper=True)
