@@ -1,5 +1,6 @@
 """What every test may use, the order in which test files start, and which tests are quick."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -15,6 +16,7 @@ set_up_libraries()  # as the command line does
 
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
+from tests.support.once import remember_foregrounds
 from tests.support.places import ROOT
 
 SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
@@ -76,6 +78,11 @@ def pytest_collection_modifyitems(config, items):
         items[:] = [item for item in items if item.nodeid in skipped]
 
 
+def pytest_collection_finish():
+    """Let no later look for garbage go through all tests and what they have imported, which stay."""
+    gc.freeze()
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item):
     report = (yield).get_result()
@@ -91,6 +98,13 @@ def pytest_sessionfinish(session, exitstatus):
 def pytest_terminal_summary(terminalreporter, config):
     """Remember what was skipped."""
     config.cache.set(SKIPPED, [report.nodeid for report in terminalreporter.stats.get("skipped", [])])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _foregrounds():
+    with pytest.MonkeyPatch.context() as patch:
+        remember_foregrounds(patch)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -96,11 +96,14 @@ def layer_of(path):
     return path.relative_to(SOURCE).parts[0].removesuffix(".py").replace("__init__", "")
 
 
+parse = functools.cache(ast.parse)  # of a source text, which nobody changes
+
+
 @functools.cache
 def imports_of(source):
     """Every module of airborne that a source text imports, as paths below it: ("body", "model")."""
     found = []
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(parse(source)):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -125,7 +128,7 @@ def upward_arrows(layer, source):
 
 def functions_of(source):
     """Every function and its length in lines without its docstring."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(parse(source)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             length = node.end_lineno - node.lineno + 1
             if ast.get_docstring(node) is not None:
@@ -154,7 +157,7 @@ def numbers_without_a_word(source):
     comments |= {row + 1 for row in comments if lines[row - 1].startswith("#")}
     return [
         lines[node.lineno - 1]
-        for node in ast.parse(source).body
+        for node in parse(source).body
         if isinstance(node, ast.Assign | ast.AnnAssign)
         and node.value is not None
         and is_number(node.value)

@@ -2,14 +2,13 @@
 
 import pytest
 
-from airborne.run import players
 from benchmarks.soak import soak_live, soak_long, soak_trials
-from tests.support.players_trial import StandIn
+from tests.support.players_trial import stand_in
 
 
 @pytest.fixture(autouse=True)
 def _stand_in(monkeypatch):
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
+    stand_in(monkeypatch)
 
 
 def grown(found, name):

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from airborne.errors import TrialError
-from airborne.run import players
 from airborne.run.check import check_trial
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from tests.cli.test_cli import in_process
 from tests.support.clips import write_clip
-from tests.support.players_trial import StandIn, pictures, write_trial
+from tests.support.players_trial import pictures, stand_in, write_trial
 
 DARK = "frames 2 to 3 are dark in all cameras"
 
@@ -25,7 +24,7 @@ def trial_with(folder, dark):
 
 
 def test_it_is_refused_by_check_and_track(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
+    stand_in(monkeypatch)
     path = trial_with(tmp_path / "trial", {"left": range(4), "right": range(4)})
     (mistake,) = check_trial(path).mistakes
     assert DARK in mistake and "start.frame" in mistake
@@ -37,7 +36,7 @@ def test_it_is_refused_by_check_and_track(tmp_path, capsys, monkeypatch):
 
 @pytest.mark.parametrize("dark", [{"left": range(4)}, {"left": [0, 1, 3], "right": [0, 1, 3]}])
 def test_one_camera_that_shows_the_start_is_enough(tmp_path, monkeypatch, dark):
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
+    stand_in(monkeypatch)
     path = trial_with(tmp_path / "trial", dark)
     assert not any("dark" in mistake for mistake in check_trial(path).mistakes)
     assert len(track_trial(read_trial(path), tmp_path / "run", pictures=False).motion) == 4

@@ -47,6 +47,18 @@ def once(function):
     return remembered
 
 
+@pytest.fixture(scope="module")
+def found_once():
+    """What of the whole trial is looked at and found, done once."""
+    return {name: once(getattr(find, name)) for name in ("find_thing", "empty_scenes", "look")}
+
+
+@pytest.fixture
+def searched(found_once, monkeypatch):
+    for name, function in found_once.items():
+        monkeypatch.setattr(find, name, function)
+
+
 def cli(monkeypatch, *words):
     """Run the command line; return its exit code."""
     monkeypatch.setattr("sys.argv", ["airborne", *map(str, words)])
@@ -55,6 +67,7 @@ def cli(monkeypatch, *words):
     return stopped.value.code or 0
 
 
+@pytest.mark.usefixtures("searched")
 def test_find_prints_a_start_that_is_right(path, tmp_path, monkeypatch, capsys):
     assert cli(monkeypatch, "find", path, "-o", tmp_path / "out") == 0
     start = tomllib.loads(capsys.readouterr().out)["start"]
@@ -84,8 +97,9 @@ def test_a_trial_without_a_start_is_tracked_and_says_how_it_began(path, tmp_path
     assert "How the start was found" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("searched")
 def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp_path, monkeypatch, capsys):
-    decide = once(find.find_thing)
+    decide = find.find_thing
 
     def undecided(model, moments):
         finding = decide(model, moments)
@@ -94,8 +108,6 @@ def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp
         return replace(finding, candidates=(replace(first, probability=0.6), other))
 
     monkeypatch.setattr(find, "find_thing", undecided)
-    for name in ("empty_scenes", "look"):
-        monkeypatch.setattr(find, name, once(getattr(find, name)))
     out = tmp_path / "out"
     assert cli(monkeypatch, "track", path, "-o", out) == 3
     said = " ".join(capsys.readouterr().err.split())
@@ -116,6 +128,7 @@ def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp
         track_trial(trial, out, take=2, resume=True, first_frame=True, pictures=False)
 
 
+@pytest.mark.usefixtures("searched")
 def test_poses_that_disagree_with_what_moves_are_not_called_likely(path, tmp_path, monkeypatch):
     find_thing = find.find_thing
 

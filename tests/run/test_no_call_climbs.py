@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import airborne
+from airborne.run import mix_ups
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from tests.support.places import THROWN_CROSS
@@ -43,7 +44,8 @@ def calls_during(work) -> set[tuple[tuple[str, str], tuple[str, str]]]:
     return calls
 
 
-def test_calls_go_down_the_rooms(tmp_path):
+def test_calls_go_down_the_rooms(tmp_path, monkeypatch):
+    monkeypatch.setattr(mix_ups, "_foreground", mix_ups._foreground.__wrapped__)  # here, too, it is found
     trial = THROWN_CROSS / "trial.toml"
     calls = calls_during(lambda: track_trial(read_trial(trial, {"stop": 3}), tmp_path / "run", pictures=False))
     assert len({called[0] for _, called in calls}) > 10  # it was watched

@@ -12,7 +12,6 @@ import trimesh
 from airborne.errors import ResultError, VideoError
 from airborne.io.folder_lock import LOCK, sole_writer
 from airborne.motion.smoothing.smoother import Smoothing
-from airborne.run import players
 from airborne.run.folder import input_hashes
 from airborne.run.smooth import smooth_run
 from airborne.run.track import track_trial
@@ -20,7 +19,7 @@ from airborne.trial.file import read_trial
 from airborne.video import VideoSource, open_recording
 from tests.cli.test_cli import in_process
 from tests.support.clips import numbered, plain_rig, write_clip
-from tests.support.players_trial import StandIn, write_run, write_trial
+from tests.support.players_trial import stand_in, write_run, write_trial
 from tests.support.run_files import contents_of
 
 WITH_TIMES = ("summary.json", "report.html")
@@ -33,7 +32,7 @@ def path(tmp_path_factory):
 
 @pytest.fixture
 def _stand_in(monkeypatch):
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
+    stand_in(monkeypatch)
 
 
 def files_of(folder):
@@ -60,7 +59,7 @@ def test_a_second_run_is_refused_while_the_first_goes_on_and_its_bytes_are_as_if
 
 
 def test_a_run_that_is_killed_before_its_record_is_whole_can_be_started_again(path, tmp_path, monkeypatch):
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
+    stand_in(monkeypatch)
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "run.json.part").write_text('{"inp')
     (tmp_path / "run" / LOCK).write_text("process 1 on here since 2026-01-01 00:00:00")

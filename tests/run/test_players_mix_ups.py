@@ -22,6 +22,13 @@ def start():
     return HALL.starts(), HALL.frames(0)
 
 
+@pytest.fixture(scope="module")
+def alone():
+    """One player's start, and the first images."""
+    hall = Hall({"bea": HALL.motions["bea"]})
+    return hall.starts(), hall.frames(0)
+
+
 def only(frames, n):
     return replace(frames, views=frames.views[:n])
 
@@ -58,14 +65,14 @@ def test_two_exchanged_videos_are_named(start, n, i, j):
 
 
 @pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 1), (3, 2), (2, 0), (2, 1)])
-def test_a_mirrored_video_is_named(start, n, i):
-    starts, first = start
+def test_a_mirrored_video_is_named(alone, n, i):
+    starts, first = alone
     assert found(starts, mirror(only(first, n), i)) == ("mirrored", (NAMES[i],))
 
 
 @pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 1), (3, 2), (2, 0), (2, 1)])
-def test_a_video_upside_down_is_named(start, n, i):
-    starts, first = start
+def test_a_video_upside_down_is_named(alone, n, i):
+    starts, first = alone
     frames = MixUp((i,), is_turned=True).undo(only(first, n))
     assert found(starts, frames) == ("turned", (NAMES[i],))
 

@@ -16,13 +16,12 @@ from airborne.cli.track import _describe
 from airborne.errors import AirborneError, ResultError, TrialError
 from airborne.motion import read_players
 from airborne.motion.players import PLAYERS_COLUMNS
-from airborne.run import players
 from airborne.run.track import track_trial
 from airborne.tracking import Status
 from airborne.trial.file import read_trial
 from tests.cli.test_cli import in_process
 from tests.support.clips import write_clip
-from tests.support.players_trial import BYSTANDER, PLAYERS, StandIn, pictures, points_of, write_trial
+from tests.support.players_trial import BYSTANDER, PLAYERS, StandIn, pictures, points_of, stand_in, write_trial
 from tests.support.run_files import files_of
 from tests.test_docs import DOCS, named, table_of
 
@@ -39,7 +38,7 @@ PICTURES = {
 
 @pytest.fixture(autouse=True)
 def _stand_in(monkeypatch):
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
+    stand_in(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +146,7 @@ def test_rows_are_out_before_the_next_frame_is_tracked(path, tmp_path, monkeypat
             seen.append(len(table.read_text().splitlines()) - 1)
             return super().step(state, frames)
 
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Watched())
+    stand_in(monkeypatch, Watched())
     track_trial(read_trial(path), tmp_path / "run", pictures=False)
     assert seen == [12 * k for k in range(12)]
 
@@ -205,11 +204,11 @@ def test_an_interrupt_leaves_the_tracked_frames_and_says_so(path, tmp_path, caps
                 raise KeyboardInterrupt
             return super().step(state, frames)
 
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Interrupted())
+    stand_in(monkeypatch, Interrupted())
     assert in_process("track", path, "-o", tmp_path / "run", "--no-pictures") == 130
     assert "--resume goes on" in capsys.readouterr().err
     assert len(read_players(tmp_path / "run" / "joints.csv")) == 5
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: StandIn())
+    stand_in(monkeypatch)
     assert in_process("track", path, "-o", tmp_path / "run", "--no-pictures", "--resume") == 0
     assert len(read_players(tmp_path / "run" / "joints.csv")) == 12
 
@@ -241,7 +240,7 @@ def test_live_pipes_end_with_an_interrupt_and_keep_whole_results(tmp_path, monke
                 raise KeyboardInterrupt
             return super().step(state, frames)
 
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Interrupted())
+    stand_in(monkeypatch, Interrupted())
     run = track_trial(read_trial(trial), tmp_path / "run", live=True)
     for thread in sent:
         thread.join(5)
@@ -277,7 +276,7 @@ def test_a_run_without_a_tracked_frame_exits_with_one(path, tmp_path, monkeypatc
             state, estimates = super().step(state, frames)
             return state, tuple(replace(each, joint_status=6 * (status,)) for each in estimates)
 
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Doubtful())
+    stand_in(monkeypatch, Doubtful())
     assert in_process("track", path, "-o", tmp_path / "run", "--no-pictures") == code
 
 
@@ -290,7 +289,7 @@ def test_a_run_in_which_everybody_is_lost_says_so_and_exits_with_one(path, tmp_p
                 replace(each, joint_status=6 * (Status.LOST,), n_views=0, **nothing) for each in estimates
             )
 
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: Lost())
+    stand_in(monkeypatch, Lost())
     assert in_process("track", path, "-o", tmp_path / "run") == 1
     assert "Anna: 0 tracked, 0 uncertain, 12 lost; median sd of a joint not known" in capsys.readouterr().out
     assert "Anna: found in no frame" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from airborne.motion import read_players
-from airborne.run import players
 from airborne.run.track import track_trial
 from airborne.tracking import Status
 from airborne.trial.file import read_trial
-from tests.support.players_trial import StandIn, write_trial
+from tests.support.players_trial import StandIn, stand_in, write_trial
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class OneKneeUncertain(StandIn):
 
 @pytest.fixture
 def run(tmp_path, monkeypatch):
-    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: OneKneeUncertain())
+    stand_in(monkeypatch, OneKneeUncertain())
     trial = read_trial(write_trial(tmp_path / "trial", 6))
     return trial, tmp_path / "run", track_trial(trial, tmp_path / "run", pictures=False)
 

@@ -16,7 +16,7 @@ from airborne.run.track import track_trial
 from airborne.tracking.estimate import lost_estimate
 from airborne.trial.file import read_trial
 from tests.support.browser import MINUTE, open_page
-from tests.support.places import THROWN_CROSS
+from tests.support.example_trial import copy_cross
 from tests.support.studio import at_pixel, fork_studio, go_home, wait_for_frame, wait_for_still_scene
 
 FRAME, TURNED, LOST, LAST, CAMERA, DRAGGED_PX = 3, 4, 5, 6, 1, (16.0, -12.0)
@@ -25,8 +25,7 @@ FRAME, TURNED, LOST, LAST, CAMERA, DRAGGED_PX = 3, 4, 5, 6, 1, (16.0, -12.0)
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """The thrown cross, its first frames tracked."""
-    folder = tmp_path_factory.mktemp("studio") / "cross"
-    shutil.copytree(THROWN_CROSS, folder)
+    folder = copy_cross(tmp_path_factory.mktemp("studio") / "cross")
     trial = folder / "trial.toml"
     trial.write_text(f"{trial.read_text()}\nstop = {LAST}\n")
     track_trial(read_trial(trial), folder / "results", pictures=False)

@@ -1,7 +1,6 @@
 """One person's digitising of the thrown cross in a real browser, 1.2 px off, is as good as the paper's: 10 mm, 3°."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from airborne.evaluation import read_digitised
 from tests.support.browser import open_page
 from tests.support.digitised_cross import MOST_DEG, MOST_MM, POINTS, compare, digitise, prepare_cross
-from tests.support.places import THROWN_CROSS
+from tests.support.example_trial import copy_cross
 from tests.support.studio import at_pixel, fork_studio, wait_for_frame
 
 FRAMES = range(0, 16, 4)
@@ -77,8 +76,7 @@ def try_points(page):
 
 def test_a_click_belongs_to_the_frame_that_it_was_made_in(tmp_path):
     """Also where it is made before the page has heard of the frame."""
-    folder = tmp_path / "cross"
-    shutil.copytree(THROWN_CROSS, folder)
+    folder = copy_cross(tmp_path / "cross")
     script = """async ([pane, place, frames]) => {
         const canvas = document.querySelector("canvas.view"), box = canvas.getBoundingClientRect();
         const [x, y] = canvas.view.toScreen(canvas.view.layout()[pane], ...place);

@@ -1,7 +1,6 @@
 """A search that is undecided: its candidates are pictures to choose from, in a real browser."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from airborne.studio import commands
 from airborne.studio.session import Session
 from airborne.studio.starts import FOUND_LIST, FOUND_PICTURE, pose_of
 from tests.support.browser import open_page
-from tests.support.places import THROWN_CROSS
+from tests.support.example_trial import copy_cross
 from tests.support.studio import User, fork_studio, wait_for_frame
 
 SHARES = (0.6, 0.4)
@@ -33,7 +32,7 @@ def undecided():
 @pytest.fixture
 def folder(tmp_path):
     """The thrown cross without a start, and what an undecided search leaves."""
-    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    folder = copy_cross(tmp_path / "cross")
     trial = parse_editable_toml((folder / "trial.toml").read_text())
     start = dict(trial.pop("start"))
     (folder / "trial.toml").write_text(trial.as_string())

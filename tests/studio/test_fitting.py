@@ -2,7 +2,6 @@
 
 import csv
 import re
-import shutil
 
 import numpy as np
 
@@ -10,13 +9,13 @@ from airborne.studio.disagreement import EdgeShift
 from airborne.studio.fitting import FirstPoseFit, describe_quality, fit_to_frame
 from airborne.studio.session import Session
 from airborne.studio.starts import read_pose
-from tests.support.places import THROWN_CROSS
+from tests.support.example_trial import copy_cross
 
 NEAR_M = 0.006  # as near as tracked frames of the cross are
 
 
 def test_poses_beside_the_body_are_fitted_to_the_pictures_of_their_frame(tmp_path):
-    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    folder = copy_cross(tmp_path / "cross")
     session, before = Session(folder, folder / "trial.toml"), (folder / "trial.toml").read_bytes()
     model = session.project().model()
     frame, start = read_pose(session, model)

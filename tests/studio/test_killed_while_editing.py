@@ -2,7 +2,6 @@
 
 import contextlib
 import random
-import shutil
 import threading
 import time
 
@@ -12,10 +11,10 @@ from airborne.io.text import read_json
 from airborne.studio.drafts import DRAFTS
 from airborne.studio.things import parse_thing
 from tests.support.browser import open_page
-from tests.support.places import THROWN_CROSS
+from tests.support.example_trial import copy_cross
 from tests.support.studio import at_pixel, fork_studio, kill_studio
 
-OLD_S, BUSY_S = 2.0, (0.5, 4.0)  # what may be lost; how much longer someone works until the studio is killed
+OLD_S, BUSY_S = 2.0, (0.3, 1.5)  # what may be lost; how much longer someone works until the studio is killed
 PATIENCE_MS = 5000  # with a studio that may be killed
 AGAIN_MS = 8000  # after which a click is lost
 STEP_PX, PANE = 12.0, 0  # of each drag, to the right in this camera's picture
@@ -35,7 +34,7 @@ STILL = """() => {
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """The thrown cross."""
-    return shutil.copytree(THROWN_CROSS, tmp_path_factory.mktemp("studio") / "cross")
+    return copy_cross(tmp_path_factory.mktemp("studio") / "cross")
 
 
 @contextlib.contextmanager

@@ -2,7 +2,6 @@
 
 import math
 import re
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from airborne.errors import BodyError
 from airborne.io.text import read_toml
 from airborne.studio.things import Solid, check_thing, colour_at, parse_thing, thing_text
 from tests.support.browser import open_page
-from tests.support.places import THROWN_CROSS
+from tests.support.example_trial import copy_cross
 from tests.support.studio import User, at_pixel, fork_studio, wait_for_frame
 
 BOX = Solid("bar", "box", (60.0, 900.0, 45.0), (0.0, 10.0, 0.0), (0.0, 0.0, 90.0), colour=(231, 200, 48))
@@ -69,7 +68,7 @@ def test_a_colour_is_the_median_about_a_click_even_at_the_border():
 
 
 def test_a_solid_takes_the_colour_that_is_clicked_in_a_picture(tmp_path):
-    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    folder = copy_cross(tmp_path / "cross")
     with fork_studio(folder) as address, open_page(address.replace("/?", "/thing?")) as page:
         wait_for_frame(page, 0)
         page.get_by_label("lengths [mm] y").fill("900")

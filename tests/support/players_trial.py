@@ -11,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body.legs import LEG_POINTS
 from airborne.cameras import Camera, Rig, write_pose2sim
 from airborne.motion import PlayersWriter
+from airborne.run import check, players, track
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from tests.support.clips import write_clip
@@ -112,6 +113,13 @@ class StandIn:
             )
             for name, x in PLAYERS.items()
         )
+
+
+def stand_in(monkeypatch, tracker=None) -> None:
+    """Let a stand-in find the players of trials whose pictures show nobody: no mix-up is looked for in them either."""
+    monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: tracker or StandIn())
+    for user in (track, check):
+        monkeypatch.setattr(user, "refuse_players_mix_ups", lambda starts, recording: None)
 
 
 def write_run(folder: Path, n=12) -> Path:

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 import tomllib
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from airborne.sync import Offsets
 from airborne.sync.from_trial import round_to_images, synchronise, write_offsets
 from airborne.trial.file import read_trial
 from airborne.video import VideoSource
+from tests.support.example_trial import copy_cross
 from tests.support.places import THROWN_CROSS
 from tests.support.tolerances import EXACT
 
@@ -25,8 +25,7 @@ FIELD_S = 0.02
 
 @pytest.fixture
 def trial(tmp_path) -> Path:
-    shutil.copytree(EXAMPLE, tmp_path / "thrown")
-    return tmp_path / "thrown" / "trial.toml"
+    return copy_cross(tmp_path / "thrown") / "trial.toml"
 
 
 def offsets(offset_s, sd_s=(0, 0.001, 0.002), drift=(0, 0, 0)) -> Offsets:

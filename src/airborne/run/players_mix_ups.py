@@ -20,6 +20,7 @@ from airborne.tracking.capsules.occlusion import count_unoccluded
 from airborne.tracking.capsules.track import evidence_per_px
 from airborne.tracking.capsules.tracker import fit_starts
 from airborne.tracking.players import PlayerStart
+from airborne.types import Array
 from airborne.video import Frames, Recording
 
 # times the evidence as named, nats a pixel, and share of cameras that show each player, of the images as they would be
@@ -45,14 +46,20 @@ def players_mix_up_in(starts: Sequence[PlayerStart], first: Frames) -> Finding |
     """
     with_legs = [start for start in starts if start.has_legs]
     n_views = sum(view is not None for view in first.views)
-    named = _fit(with_legs, first) if n_views > 1 else []
+    if n_views < 2:
+        return None
+    try:
+        states = [start_state(start.name, start.joints_m) for start in with_legs]
+    except TrialError:
+        return None
+    named = _fit(with_legs, states, first)
     if not named or (_shown(named, first) == 1 and n_views > 2):
         return None
     nats, names = max(_nats(named), 1.0), [view.camera.name if view else "" for view in first.views]
     best, most, found = None, _MORE, named
     for mix_up in possible_mix_ups(len(names)):
         right = mix_up.undo(first)
-        fits = [] if right is None else _fit(with_legs, right)
+        fits = [] if right is None else _fit(with_legs, states, right)
         if fits and _nats(fits) > most * nats:
             best, most, found = mix_up, _nats(fits) / nats, fits
     if best is None or _evidence(found) < _LEAST_EVIDENCE or _shown(found, first) <= _LEAST_SHOWN:
@@ -62,10 +69,10 @@ def players_mix_up_in(starts: Sequence[PlayerStart], first: Frames) -> Finding |
     return best.finding(names, what)
 
 
-def _fit(starts: Sequence[PlayerStart], frames: Frames) -> list[FirstFrameFit]:
-    """Fit the players; empty where an image shows none of somebody."""
+def _fit(starts: Sequence[PlayerStart], states: Sequence[Array], frames: Frames) -> list[FirstFrameFit]:
+    """Fit the players from their start states (35,); empty where an image shows none of somebody."""
     try:
-        return fit_starts(starts, [start_state(start.name, start.joints_m) for start in starts], frames)
+        return fit_starts(starts, states, frames)
     except TrialError:
         return []
 

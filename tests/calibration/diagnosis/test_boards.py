@@ -44,13 +44,13 @@ def test_the_right_board_is_not_flagged(board):
 
 
 def test_another_dictionary_is_named():
-    said = sentence(replace(CHARUCO, dictionary="DICT_6X6_50"), pictures(CHARUCO))
+    said = sentence(replace(CHARUCO, dictionary="DICT_6X6_50"), pictures(CHARUCO, 2))
     assert said.startswith("cam1: 0 markers are seen as the board is described")
     assert said.endswith('the print is another one; set dictionary = "DICT_5X5_50"')
 
 
 def test_a_print_in_reverse_is_named():
-    said = sentence(CHARUCO, pictures(replace(CHARUCO, is_inverted=True)))
+    said = sentence(CHARUCO, pictures(replace(CHARUCO, is_inverted=True), 2))
     assert said.endswith("the print is another one; set inverted = true")
 
 
@@ -94,7 +94,7 @@ def real(shared_data):
     video, greys = cv2.VideoCapture(str(folder / "cam_1.mp4")), []
     while (read := video.read())[0]:
         greys.append(cv2.cvtColor(read[1], cv2.COLOR_BGR2GRAY))
-    return read_board(folder / "charuco.toml"), greys[::12]
+    return read_board(folder / "charuco.toml"), greys[::24]
 
 
 def test_a_real_board_is_not_flagged(real):

@@ -86,15 +86,21 @@ def start_state(name: str, joints_m: Mapping[str, Array]) -> Array:
 
 
 def fit_first_frame(
-    name: str, joints_m: Mapping[str, Array], frames: Frames, others: Capsules, *, looser: float = 1.0
+    name: str,
+    joints_m: Mapping[str, Array],
+    frames: Frames,
+    others: Capsules,
+    *,
+    looser: float = 1.0,
+    start: Array | None = None,
 ) -> FirstFrameFit:
     """Fit pose and shape to the first frame, with the colours relearned in each round.
 
-    Joints that were not set by hand are `looser` by a factor.
+    Joints that were not set by hand are `looser` by a factor. `start` (35,) is their `start_state`, where it is known.
 
     Raises TrialError where no camera shows the player.
     """
-    state = start_state(name, joints_m)
+    state = start_state(name, joints_m) if start is None else start
     anchors = np.array([joints_m.get(joint, np.full(3, np.nan)) for joint in JOINTS], float)
     sd = np.concatenate([_POSE_SD, _LENGTH_SD, _RADIUS_SD * state[N_DOF + N_LENGTHS :]])
     prior = JumperPrior(state.copy(), np.diag(1 / sd**2), anchors, looser * _ANCHOR_SD_M)

@@ -217,7 +217,7 @@ def _mean_evidence(part: NDArray[np.int8], region: PlayerRegion, colours: Surfac
 
 def _augment_brightness(counts: NDArray[np.float32]) -> Array:
     """Spread colour counts (k, 32, 32, 32) over the same colours in more and in less light."""
-    i, *cell = np.nonzero(counts)
+    i, *cell = np.unravel_index(np.flatnonzero(counts != 0), counts.shape)  # much sooner than np.nonzero finds them
     lit = np.minimum(_LIGHTS[:, None, None] * (np.array(cell) + 0.5), BINS_PER_CHANNEL - 1)  # (lights, 3, n)
     lit = lit.astype(int)
     to = np.ravel_multi_index((np.broadcast_to(i, lit[:, 0].shape), *np.moveaxis(lit, 1, 0)), counts.shape)

@@ -176,7 +176,7 @@ def fit_starts(
     fits = []
     for i, (start, state) in enumerate(zip(starts, states, strict=True)):
         occluders = occluding_capsules(state, [*states[:i], *states[i + 1 :], *others])
-        fits.append(fit_first_frame(start.name, start.joints_m, frames, occluders))
+        fits.append(fit_first_frame(start.name, start.joints_m, frames, occluders, start=state))
     return fits
 
 

@@ -1,0 +1,24 @@
+"""What a studio loads once it is asked for a page, for the process of which the tests' studios are forks."""
+
+import gc
+from importlib import import_module
+
+import numpy as np
+
+from airborne.geometry.swing_twist import swing_twist_from_matrix
+
+SERVING = (
+    *("anyio._backends._asyncio", "nicegui.ui_run", "uvicorn.lifespan.on", "uvicorn.loops.auto"),
+    *("uvicorn.protocols.http.auto", "uvicorn.protocols.websockets.wsproto_impl"),
+)
+PARTS = (
+    *("button", "card", "checkbox", "dialog", "expansion", "input", "keyboard", "notification", "number", "select"),
+    *("timer", "tooltip"),
+)
+
+for name in SERVING:
+    import_module(name)
+for name in PARTS:
+    import_module(f"nicegui.elements.{name}")
+swing_twist_from_matrix(np.eye(3)[None])  # what Numba loads at its first kernel takes half a second
+gc.freeze()
