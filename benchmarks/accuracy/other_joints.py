@@ -229,10 +229,15 @@ def measure(seed: int) -> list[dict]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "trial"
         track_trial(record(seed, folder), Path(name) / "run", pictures=False)
-        motion, model = read_body_run(Path(name) / "run")
-        found = compare_joints(motion, model, read_joint_paths(folder / "truth_joints.csv"))
-        pelvis_deg = pelvis_errors_deg(motion, read_columns(folder / "truth.csv"))
-        angles = joint_errors_in_sds(motion, read_columns(folder / "truth_angles.csv"))
+        return rows_of(seed, folder, Path(name) / "run")
+
+
+def rows_of(seed: int, folder: Path, run: Path) -> list[dict]:
+    """Return the rows of a person's recording and its run."""
+    motion, model = read_body_run(run)
+    found = compare_joints(motion, model, read_joint_paths(folder / "truth_joints.csv"))
+    pelvis_deg = pelvis_errors_deg(motion, read_columns(folder / "truth.csv"))
+    angles = joint_errors_in_sds(motion, read_columns(folder / "truth_angles.csv"))
     common = {"data": f"person {seed}", "method": "refined", "n": found.whole.n}
     return [
         {**common, "metric": "mean joint error", "unit": "mm", "value": found.whole.mean_mm},
