@@ -31,10 +31,11 @@ from airborne.types import Array
 
 Look = Callable[[Sequence[Pose]], Sequence[ImageEvidence]]  # one pass over the images of a run, a pose each frame
 
-# spectral densities of accelerations [m2/s3, rad2/s3]: of root and limbs an sd of 120 m/s2, rad/s2 at 50 frames/s. On a
-# synthetic person who tucks and opens in 0.17 s joints err by 11.1 mm without constant offsets, with 30 by 12.7, and
-# knees open too early and too slowly; on four slower people both err alike
+# spectral densities of accelerations [m2/s3, rad2/s3]: of limbs an sd of 120 rad/s2 at 50 frames/s. On two synthetic
+# people who tuck and open in 0.17 s joints err by 10.6 and 16.0 mm without constant offsets, with 30 by 12.4 and 18.6,
+# and knees open too early and too slowly; on four slower people both err alike
 _DENSITY = 120.0**2 / 50
+_ROOT_DENSITY = 30.0**2 / 50  # of the root, m/s2 and rad/s2: with 120 its rotation errs by 3 % more on those people
 _TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: with 30 rad/s2 joints err by 0.7 % more; with 5 the largest do
 # [m2/s3] of the centre of mass's in flight, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2 the least errors
 # of the same, four of them tracked with bodies of other lengths and girths
@@ -184,7 +185,9 @@ def acceleration_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, gr
     values = np.diff(rate, axis=0) / between_s[..., None]
     values[:, 0] -= gravity_m_s2
     is_trunk = [False] * 2 + [segment.name in TRUNK for segment in model.segments[1:]]
-    sd = np.sqrt(np.where(is_trunk, _TRUNK_DENSITY, _DENSITY) / between_s)
+    density = np.where(is_trunk, _TRUNK_DENSITY, _DENSITY)
+    density[:2] = _ROOT_DENSITY
+    sd = np.sqrt(density / between_s)
     return JoiningRows(rows / sd[..., None, None, None], values / sd[..., None])
 
 
