@@ -247,6 +247,15 @@ def test_landmarks_lie_between_their_points():
     assert {"foot_right", "hand_left"}.isdisjoint(found)
 
 
+def test_a_ball_of_the_foot_without_the_small_toe_lies_toward_the_big_one():
+    names = ("heel_left", "toe_left", "small_toe_left")
+    points = np.arange(18.0).reshape(2, 3, 3)
+    points[1, 2] = np.nan
+    found = landmarks_from_points(names, points)["foot_left"]
+    np.testing.assert_allclose(found[0], 0.25 * points[0, 0] + 0.375 * (points[0, 1] + points[0, 2]))
+    np.testing.assert_allclose(found[1], 0.25 * points[1, 0] + 0.75 * points[1, 1])
+
+
 def test_landmark_is_unknown_where_a_point_of_it_is_and_its_own_point_goes_first():
     names = ("ear_left", "ear_right", "head")
     points = np.array([[0.0, 0, 0], [np.nan] * 3, [1, 2, 3]])

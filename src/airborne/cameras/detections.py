@@ -202,13 +202,15 @@ def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Arra
     """Return points (..., points, 3) [m] by name, and the landmarks interpolated between them, each (..., 3).
 
     Without keypoints of their own, the head is midway between the ears, the middle of the hand between the knuckles of
-    the first and the last finger, the ball of the foot three quarters of the way from heel to toes. NaN where a
-    keypoint that it needs is NaN; left out where the set has no such keypoint.
+    the first and the last finger, the ball of the foot three quarters of the way from heel to toes, or to the big toe
+    alone. NaN where keypoints that it needs are NaN; left out where the set has no such keypoint.
     """
     landmarks = {name: points[..., i, :] for i, name in enumerate(names)}
-    for landmark, recipes in LANDMARK_RECIPES.items():
-        for recipe in recipes:
-            if landmark not in landmarks and set(recipe) <= set(names):
+    for landmark in [each for each in LANDMARK_RECIPES if each not in landmarks]:
+        for recipe in LANDMARK_RECIPES[landmark]:
+            if set(recipe) <= set(names):
                 between = points[..., [names.index(name) for name in recipe], :]
-                landmarks[landmark] = np.einsum("...pi,p->...i", between, np.array(list(recipe.values())))
+                found = np.einsum("...pi,p->...i", between, np.array(list(recipe.values())))
+                known = landmarks.get(landmark, np.full_like(found, np.nan))
+                landmarks[landmark] = np.where(np.isnan(known), found, known)
     return landmarks
