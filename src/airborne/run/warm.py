@@ -12,12 +12,14 @@ from typing import Any
 import av
 import numpy as np
 
-from airborne.appearance import BackgroundModel, light_planes
+from airborne.appearance import BackgroundModel, count_colours, light_planes
 from airborne.appearance.background import TILE_PX
 from airborne.appearance.brightness import brightness_ratios
 from airborne.appearance.lighting import LIGHT_FROM_SRGB
+from airborne.appearance.surface_classes import class_evidence
 from airborne.body import Pose
 from airborne.body_fitting.first_frames import fit_preset
+from airborne.cameras import camera_looking_at
 from airborne.motion.smoothing.kalman import kalman_smoother
 from airborne.motion.smoothing.segments import MIN_FRAMES
 from airborne.rendering import evidence_maps
@@ -25,6 +27,9 @@ from airborne.run.players_tracker import compile_kernels
 from airborne.run.track import track_trial
 from airborne.synthetic import scene_frames, somersault_scene
 from airborne.synthetic.throw.measurements import start_pose
+from airborne.tracking.capsules.floor_search import evaluate_grid
+from airborne.tracking.capsules.jumper import SURFACE_CLASSES
+from airborne.tracking.capsules.standing import ColourViews
 from airborne.tracking.methods import Settings, sample_body_colours, tracker_of
 from airborne.tracking.model_based.degrees_of_freedom import limbs_of
 from airborne.tracking.model_based.global_search import SearchRange, search_globally
@@ -33,7 +38,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.tracker import step
 from airborne.trial.examples import example_trial
 from airborne.trial.file import Trial, read_trial
-from airborne.video import Frames
+from airborne.video import Frames, View
 from airborne.video.crops import conversion_of
 
 _N_FRAMES = 4  # the first is found, the second followed, later ones also predicted
@@ -82,12 +87,25 @@ def read_images() -> None:
         image = np.zeros((2, 4, 3), kind)
         for part in (image, image[:, 1:3]):
             light_planes(part, LIGHT_FROM_SRGB, np.empty((3, *part.shape[:2]), np.float32))
+    image, colours = np.zeros((2, 4, 3), np.uint8), np.zeros((32, 32, 32), np.float32)
+    table, classes = np.zeros((colours.size, len(SURFACE_CLASSES)), np.float32), len(SURFACE_CLASSES)
+    for part in (image, image[:, 1:3]):
+        count_colours(part, np.zeros(part.shape[:2], np.bool_), 1, colours)
+        class_evidence(part, table, 1, np.empty((classes, *part.shape[:2]), np.float32))
     image = np.zeros((2 * TILE_PX, 3 * TILE_PX, 3), np.uint8)
     known = BackgroundModel().learn(image, np.zeros(image.shape[:2], np.bool_), (0, 0))
     for part in (image, image[:8], image[:TILE_PX, :TILE_PX].copy(), image[:8, :8].copy()):
         for corner in ((0, 0), (1, 1)):
             brightness_ratios(part, known, corner)
             brightness_ratios(part, BackgroundModel(), corner)
+
+
+def _look_for_players() -> None:
+    """Look for players, as for those whom no start names, where the images tell nothing."""
+    camera = camera_looking_at("front", np.array([0, -8, 2.0]), np.array([0, 0, 1.0]), focal_px=60.0, size=_SIZE)
+    grey = View(camera, np.full((*_SIZE[::-1], 3), 128, np.uint8))
+    views = ColourViews.of([grey], np.array([[-1.0, -1.0], [1.0, 1.0]]))
+    evaluate_grid(views, np.zeros((1, 2)))
 
 
 def smooth_a_path() -> None:
@@ -109,4 +127,5 @@ def _track_others() -> None:
     }
     compile_kernels(Trial(**tables))
     read_images()
+    _look_for_players()
     smooth_a_path()
