@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from airborne.batch.row import row_of
@@ -26,6 +27,18 @@ def test_frames_may_be_tracked_where_joints_are_not(tmp_path):
     assert found["share_tracked"] == 1
     assert found["share_joints_tracked"] == pytest.approx(11 / 20)
     assert "share_joints_tracked" not in row(tmp_path)
+
+
+def test_a_rise_has_the_deviations_of_single_frames(tmp_path):
+    t = np.arange(60) / 50
+    falls = np.clip(t, 0.4, 0.8) - 0.4
+    height_m = 1 + 1.962 * falls - 9.81 / 2 * falls**2
+    (tmp_path / "tables").mkdir()
+    for names, cells in (("com_z_m_sd", "0.001"), ("com_z_m_sd,com_z_m_sd_frame", "0.5,0.001")):
+        lines = [f"{at},{high},{cells}\n" for at, high in zip(t, height_m, strict=True)]
+        (tmp_path / "tables" / "flight.csv").write_text(f"time_s,com_z_m,{names}\n{''.join(lines)}")
+        found = row(tmp_path)
+        assert found["com_rise_m_sd"] == pytest.approx(0.001 * 2**0.5, rel=0.01)
 
 
 def test_of_players_the_highest_jump_stands_in_the_row_or_else_the_longest(tmp_path):

@@ -4,23 +4,30 @@ import errno
 import json
 import re
 import sys
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from pyarrow.csv import read_csv
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne import cli
+from airborne.body import Pose
 from airborne.body.files import write_body
 from airborne.errors import ResultError
 from airborne.evaluation import read_joint_paths
 from airborne.export.takes import with_axis_markers
-from airborne.motion import MotionWriter, landmarks, read_players
+from airborne.motion import MotionWriter, landmarks, measure_flight, read_motion, read_players
+from airborne.motion.covariance_file import write_covariances
 from airborne.run import export
 from airborne.run.export import EXPORT_FORMATS, export_run
 from airborne.tracking import Estimate, Status
 from tests.support.export_scenes import BOX, PERSON
+from tests.support.motions import motion_of, small_covariance
 from tests.support.players_trial import write_run
 from tests.support.takes import tumbling
+from tests.support.tolerances import EXACT
 
 UNFINISHED = "the run is not finished: these are the frames so far; `airborne track --resume` goes on"
 MARKED = "status in .csv, sd as residual in .c3d, unmarked in .trc, .mot, .bvh and .glb"
@@ -167,6 +174,25 @@ def test_where_nothing_was_found_there_is_nothing_to_export(tmp_path):
     with pytest.raises(ResultError, match="found in no frame"):
         export_run(folder)
     assert not (folder / "export").exists()
+
+
+def test_the_centre_of_mass_is_that_of_the_whole_run_with_lasting_errors(tmp_path):
+    turns = [
+        RigidTransform.from_components([0, 0, 1 + 2 * t - 9.81 / 2 * t**2], Rotation.from_rotvec([5 * t, 0, 0]))
+        for t in np.arange(21) / 50
+    ]
+    still = np.zeros((len(PERSON.segments) - 1, 3))
+    poses = [Pose(world_from_root=turn, joint_angles=still) for turn in turns]
+    motion = motion_of(PERSON, poses, covariance=small_covariance(PERSON))
+    folder = write_body_run(tmp_path / "run", replace(motion, time_s=np.round(motion.time_s, 6)), PERSON)
+    write_covariances(folder / "lasting.bin", np.tile(1e-4 * np.eye(6), (len(motion), 1, 1)))
+    export_run(folder, tmp_path, formats=["csv"])
+    stored = read_motion(folder / "motion.csv")
+    table = measure_flight(stored, PERSON)
+    assert (table["com_sd"] > 0.01).all()
+    columns = read_csv(tmp_path / "run.csv")
+    for name, values in (("com_z_m", table["com"]), ("com_z_m_sd", table["com_sd"])):
+        np.testing.assert_allclose(columns[name].to_numpy(), values.sel(space="z"), atol=EXACT)
 
 
 def test_progress_grows_to_its_end(person_run, tmp_path):

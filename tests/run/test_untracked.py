@@ -54,7 +54,7 @@ def test_of_a_wrong_start_it_is_said_what_was_tried():
     said = explained(None, SCENE.start().move([0.8, 0.5, 0.0], [0.0, 0.0, 2.0]))
     assert said.endswith(
         "with videos exchanged or mirrored, nor with one camera left out, nor with another size of the body: are "
-        "[start], the body and the calibration right?"
+        "[start], the body and the calibration right, and does nothing stand between the cameras and the body?"
     )
 
 

@@ -4,8 +4,14 @@ import os
 import shutil
 import subprocess
 import sys
+from itertools import product
 
+from airborne.appearance import light_planes
+from airborne.appearance.brightness import _count_ratios
+from airborne.motion.smoothing import kalman
+from airborne.run.warm import read_images, smooth_a_path
 from airborne.trial.examples import example_trial
+from airborne.video import crops
 from tests.support.example_trial import LONG, edit_trial
 
 AIRBORNE = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
@@ -24,3 +30,12 @@ def test_what_was_warmed_compiles_nothing(tmp_path):
     short = edit_trial(folder / "trial.toml", "short.toml", ("[track]", f"[track]\nstop = {LONG}"))
     done = airborne("track", str(short), "-o", str(tmp_path / "run"), "--no-pictures")
     assert "compiling" not in done.stderr
+
+
+def test_whole_images_and_parts_are_read_as_all_types_that_occur():
+    read_images()
+    smooth_a_path()
+    planes = {(str(image.dtype), image.layout) for image, *_ in light_planes.signatures}
+    assert planes >= set(product(("uint8", "float32"), "AC"))
+    assert {(image.layout, known.layout) for image, known, *_ in _count_ratios.signatures} >= set(product("AC", "AC"))
+    assert all(kernel.signatures for kernel in (crops._convert, kalman._filter_kernel))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airborne.kernels import kernel
 
 START_SD = 6.0  # [grey levels] of a pixel that was observed once
-_TILE_PX = 128  # side of the tiles that a learned background shares with the one before
+TILE_PX = 128  # side of the tiles that a learned background shares with the one before
 _MIN_RATE = 0.05  # least weight of a pixel's newest observation, so that slow changes of light are followed
 
 
@@ -26,7 +26,7 @@ class BackgroundPixels(NamedTuple):
 
 _Tile = NDArray[np.float32]  # (h, w, 5): a pixel's mean (3), sd, number of observations, in one array to be copied fast
 _Slices = tuple[slice, slice]
-_UNKNOWN: _Tile = np.zeros((_TILE_PX, _TILE_PX, 5), np.float32)
+_UNKNOWN: _Tile = np.zeros((TILE_PX, TILE_PX, 5), np.float32)
 _UNKNOWN[..., 3] = START_SD
 
 
@@ -63,12 +63,12 @@ class BackgroundModel:
 def _tiles_of(corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[tuple[int, int], _Slices, _Slices]]:
     """Return the tiles that a region touches: row and column, and what they share, in the region and in the tile."""
     (x0, y0), (height, width) = corner, size
-    for row in range(y0 // _TILE_PX, -(-(y0 + height) // _TILE_PX)):
-        v = _TILE_PX * row
-        top, bottom = max(y0, v), min(y0 + height, v + _TILE_PX)
-        for column in range(x0 // _TILE_PX, -(-(x0 + width) // _TILE_PX)):
-            u = _TILE_PX * column
-            left, right = max(x0, u), min(x0 + width, u + _TILE_PX)
+    for row in range(y0 // TILE_PX, -(-(y0 + height) // TILE_PX)):
+        v = TILE_PX * row
+        top, bottom = max(y0, v), min(y0 + height, v + TILE_PX)
+        for column in range(x0 // TILE_PX, -(-(x0 + width) // TILE_PX)):
+            u = TILE_PX * column
+            left, right = max(x0, u), min(x0 + width, u + TILE_PX)
             yield (
                 (row, column),
                 np.s_[top - y0 : bottom - y0, left - x0 : right - x0],

@@ -85,7 +85,9 @@ def _jump(path: Path) -> TableRow:
     if not path.is_file():
         return {}
     (_, names), *rows = read_csv(path, "expected a flight's table", ResultError)
-    columns = [names.index(name) for name in ("time_s", "com_z_m", "com_z_m_sd")]
+    # errors that last all run long move no take-off; tables of older versions hold those of single frames alone
+    sd_name = "com_z_m_sd_frame" if "com_z_m_sd_frame" in names else "com_z_m_sd"
+    columns = [names.index(name) for name in ("time_s", "com_z_m", sd_name)]
     values = np.array([[float(cells[k] or "nan") for k in columns] for _, cells in rows]).reshape(-1, 3)
     time_s, height_m, sd = values[np.isfinite(values[:, 1])].T
     if not ((np.diff(time_s) > 0).all() and (np.abs(height_m) < _HIGHEST_M).all()):

@@ -261,7 +261,7 @@ def bench_command(as_json: Json = False) -> None:
 
 
 def warm_command() -> None:
-    """Compile now what the first runs would compile, for machines that are prepared; about a minute, once.
+    """Compile now what the first runs would compile, for machines that are prepared; a minute or more, once.
 
     Example: airborne warm
     """

@@ -121,12 +121,15 @@ def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
 def write_flight(path: Path, motion: Motion, table: xr.Dataset) -> None:
     """Write flight.csv: the centre of mass, the angular momentum about it, the root's rotation, units in the names.
 
-    The table is that of `state_flight`.
+    The table is that of `state_flight`; each frame's status is its pose's.
     """
-    columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}
+    columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s, "status": motion.status}
     for name, stem in (("com", "com_{}_m"), ("angular_momentum", "L_{}_kg_m2_s")):
         columns |= {stem.format(axis): table[name].sel(space=axis).to_numpy() for axis in "xyz"}
-        columns |= {f"{stem.format(axis)}_sd": table[f"{name}_sd"].sel(space=axis).to_numpy() for axis in "xyz"}
+        for sd in ("sd", "sd_frame"):
+            of_axes = table.get(f"{name}_{sd}")
+            if of_axes is not None:
+                columns |= {f"{stem.format(axis)}_{sd}": of_axes.sel(space=axis).to_numpy() for axis in "xyz"}
     columns |= {"somersault_rev": table["somersault"].to_numpy(), "twist_rev": table["twist"].to_numpy()}
     _write_csv(path, columns | {"tilt_deg": table["tilt"].to_numpy()})
 

@@ -21,7 +21,8 @@ from airborne.export.takes import Take, body_take, player_takes, portable_names,
 from airborne.export.trc import write_trc
 from airborne.io.parquet import CAN_WRITE_PARQUET
 from airborne.io.writing import explain_full_disk
-from airborne.motion import Motion, has_inertias, landmarks, measure_flight
+from airborne.motion import Motion, has_inertias, landmarks
+from airborne.motion.flight.momentum_table import state_centres_of_mass
 from airborne.motion.run_folder import EXPORTS, holds_players, note_if_unfinished, read_body_run, read_players_run
 from airborne.tracking import Status
 from airborne.types import Array, Progress, StageProgress
@@ -113,11 +114,10 @@ def _read_body(folder: Path, has_tables: bool, progress: Progress) -> _RunData:
     if not motion.has_pose.any():
         raise ResultError(f"{folder}: the body was found in no frame, so there is nothing to export; track again")
     has_com = has_tables and has_inertias(model)
-    rounds = 2 if has_com else 1
-    points, sd = _measure_in_chunks(motion, lambda part: landmarks(part, model), progress, of_rounds=(0, rounds))
-    com = (
-        _measure_in_chunks(motion, lambda part: _com(part, model), progress, of_rounds=(1, rounds)) if has_com else None
-    )
+    total = len(motion) * (2 if has_com else 1)
+    points, sd = _measure_landmarks(motion, model, lambda done: progress(done, total))
+    com = state_centres_of_mass(motion, model) if has_com else None  # of the whole run: its fall tells where it is
+    progress(total, total)
     columns = body_columns(motion, model, points, sd, com=com) if has_tables else {}
     return _RunData([body_take(motion, model, points, sd)], columns)
 
@@ -139,24 +139,17 @@ def _read_players(folder: Path) -> _RunData:
     return _RunData(takes, players_columns(motion), tuple(notes))
 
 
-def _measure_in_chunks(
-    motion: Motion, measure: Callable[[Motion], tuple[Array, Array]], progress: Progress, of_rounds: tuple[int, int]
-) -> tuple[Array, Array]:
-    """Measure a motion some rows at a time, reporting progress."""
-    parts, (done, rounds), n = [], of_rounds, len(motion)
-    for first in range(0, n, _ROWS_AT_A_TIME):
+def _measure_landmarks(motion: Motion, model: BodyModel, progress: Callable[[int], None]) -> tuple[Array, Array]:
+    """Return `landmarks`, some rows at a time, reporting how many are done."""
+    parts = []
+    for first in range(0, len(motion), _ROWS_AT_A_TIME):
         rows = slice(first, first + _ROWS_AT_A_TIME)
         arrays = {each.name: getattr(motion, each.name) for each in fields(motion)}
         chunk = {name: array[rows] for name, array in arrays.items() if isinstance(array, np.ndarray)}
-        parts.append(measure(replace(motion, **chunk)))
-        progress(done * n + min(rows.stop, n), rounds * n)
+        parts.append(landmarks(replace(motion, **chunk), model))
+        progress(min(rows.stop, len(motion)))
     values, sd = (np.concatenate(each) for each in zip(*parts, strict=True))
     return values, sd
-
-
-def _com(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
-    table = measure_flight(motion, model)
-    return table["com"].to_numpy(), table["com_sd"].to_numpy()
 
 
 def _write(format: str, folder: Path, stem: str, read: _RunData) -> list[Path]:

@@ -122,7 +122,7 @@ def _explain(best: list[_Change], names: tuple[str, ...], how_many: str, *, has_
     tried += ["with one camera left out"] * (len(names) > _FEWEST_CAMERAS) + ["with another size of the body"]
     return Explanation(
         f"the first frames are not tracked either {', nor '.join(tried)}: are [start], the body and the "
-        "calibration right?",
+        "calibration right, and does nothing stand between the cameras and the body?",
         False,
     )
 

@@ -21,6 +21,7 @@ CURVE_EVENTS = ("start", "end", "take-off", "landing", "turn-1")  # turn-2, ... 
 _TURN = re.compile(r"turn-([1-9]\d?)")
 _OF_THE_ROW = {"take-off": "takeoff_s", "landing": "landing_s"}
 _WIDE = (ANGLES, FLIGHT)
+_NO_CURVES = ("frame", "time_s", "status", "is_singular")
 _LONG = {JOINTS: ("m", "sd_m"), JOINT_ANGLES: ("deg", "{axis}_deg_sd")}  # unit and sd of x_m, x_deg
 _JOINT_TABLES = [Path(name).name for name in _LONG]
 _FORM = "a run's table has a line of names, time_s among them, and as many cells in each line"
@@ -86,7 +87,7 @@ def describe_curves(trial: StudyTrial) -> str:
 
 def _list_columns(trial: StudyTrial) -> list[str]:
     wide = [column for name in _WIDE for column in _read(trial.folder / name)]
-    return [each for each in wide if not each.endswith("_sd") and each not in ("frame", "time_s", "is_singular")]
+    return [each for each in wide if not each.endswith(("_sd", "_sd_frame")) and each not in _NO_CURVES]
 
 
 def _list_joints(trial: StudyTrial, table: str) -> list[str]:

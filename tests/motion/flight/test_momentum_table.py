@@ -12,7 +12,7 @@ from airborne.body import Pose
 from airborne.errors import BodyError, ResultError
 from airborne.motion import flight_summary, has_inertias, measure_flight, write_flight
 from airborne.motion.flight.momentum import centre_of_mass
-from airborne.motion.flight.momentum_table import _fit_parabola, widen_momentum
+from airborne.motion.flight.momentum_table import _fit_parabola, state_centres_of_mass, widen_momentum
 from airborne.tracking.self_check.free_flight import WrongFall
 from tests.support.motions import figure, motion_of, shaken, small_covariance, swinging
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
@@ -20,7 +20,8 @@ from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
 MODEL = figure()
 TIMES = np.arange(21) / 50
 COLUMNS = (
-    "frame,time_s,com_x_m,com_y_m,com_z_m,com_x_m_sd,com_y_m_sd,com_z_m_sd,"
+    "frame,time_s,status,com_x_m,com_y_m,com_z_m,com_x_m_sd,com_y_m_sd,com_z_m_sd,"
+    "com_x_m_sd_frame,com_y_m_sd_frame,com_z_m_sd_frame,"
     "L_x_kg_m2_s,L_y_kg_m2_s,L_z_kg_m2_s,L_x_kg_m2_s_sd,L_y_kg_m2_s_sd,L_z_kg_m2_s_sd,"
     "somersault_rev,twist_rev,tilt_deg"
 )
@@ -48,6 +49,23 @@ def test_centre_of_mass_deviations_are_those_of_sampled_poses():
     drawn = [centre_of_mass(MODEL.with_pose(shaken(rng, pose, covariance)))[0] for _ in range(n)]
     np.testing.assert_allclose(table["com_sd"][0], np.std(drawn, axis=0), rtol=sampled(n))
     assert np.isnan(table["angular_momentum"][0]).all()
+
+
+def test_lasting_errors_of_the_root_widen_the_centre_of_mass_and_nothing_that_is_fitted():
+    rng = np.random.default_rng(2)
+    motion = motion_of(MODEL, falling(), covariance=small_covariance(MODEL), lost=[5])
+    root = (factor := 0.02 * rng.normal(size=(6, 6))) @ factor.T
+    wide = replace(motion, lasting=np.tile(root, (len(motion), 1, 1)))
+    now, then = measure_flight(wide, MODEL), measure_flight(motion, MODEL)
+    jacobians = [centre_of_mass(MODEL.with_pose(motion.pose(row)))[1][:, :6] for row in np.flatnonzero(motion.has_pose)]
+    added = np.diagonal(jacobians @ root @ np.swapaxes(jacobians, 1, 2), axis1=1, axis2=2)
+    expected = np.sqrt(then["com_sd"].to_numpy()[motion.has_pose] ** 2 + added)
+    np.testing.assert_allclose(now["com_sd"].to_numpy()[motion.has_pose], expected, atol=ROUNDTRIP)
+    assert now.drop_vars("com_sd").identical(then.drop_vars("com_sd"))
+    assert then["com_sd"].equals(then["com_sd_frame"])
+    assert flight_summary(wide, now) == flight_summary(motion, then)
+    for each, table in zip(state_centres_of_mass(wide, MODEL), (now["com"], now["com_sd"]), strict=True):
+        np.testing.assert_array_equal(each, table)
 
 
 def test_summary_of_a_free_fall_finds_gravity_rotations_and_a_constant_momentum():
@@ -146,7 +164,8 @@ def test_table_has_a_unit_in_every_column_and_empty_cells_where_lost(tmp_path):
     with (tmp_path / "flight.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == COLUMNS.split(",")
-    assert all(rows[5][name] == "" for name in COLUMNS.split(",")[2:])
+    assert all(rows[5][name] == "" for name in COLUMNS.split(",")[3:])
+    assert [row["status"] for row in rows] == motion.status.tolist()
     assert all(rows[4][name] != "" for name in COLUMNS.split(","))
     table = measure_flight(motion, MODEL)
     assert float(rows[7]["com_z_m"]) == pytest.approx(float(table["com"][7, 2]), abs=EXACT)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.cameras import Rig
-from airborne.tracking.self_check.causes import name_causes
+from airborne.tracking.self_check.causes import LikelyCause, name_causes
 from airborne.tracking.self_check.check import doubts, gather_equations, self_check
 from airborne.tracking.self_check.nuisances import (
     ONE_CAMERA_SD,
@@ -134,6 +134,13 @@ def test_what_is_wrong_is_named_first_with_its_size(wrong, subject, kind, value)
     assert first.is_alarm
     assert (first.subject, first.kind) == (subject, kind)
     assert abs(first.value - value) < 2.5 * first.sd < 0.5 * abs(value)
+    assert first.sentence.endswith(f"`offset_s` should be {first.value:.4f} s larger)") == (kind == "time_s")
+
+
+def test_of_an_early_camera_a_smaller_offset_is_asked_for():
+    early = LikelyCause("cam2", "time_s", -0.0204, 0.0034, is_alarm=True)
+    assert early.sentence == "camera cam2 seems 20.4 ± 3.4 ms early (its `offset_s` should be 0.0204 s smaller)"
+    assert replace(early, is_alarm=False).sentence == "camera cam2 seems 20.4 ± 3.4 ms early"
 
 
 @pytest.mark.parametrize("rate", [1.05, 1.1, 0.8])

@@ -69,7 +69,8 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     """Measure a body in flight, frame by frame, with standard deviations to first order.
 
     - `com` (time, space) [m]: the centre of mass in the world; where the body falls freely and turns, it is moved in
-      the root's frame to where it falls best (see `fit_fall`)
+      the root's frame to where it falls best (see `fit_fall`); `com_sd` holds the root's lasting errors, too,
+      `com_sd_frame` those of single frames alone
     - `angular_momentum` (time, space) [kg m2/s]: about the centre of mass, world axes; rates are slopes of
       parabolas over `window` frames, never across a lost frame (see `angular_momenta`)
     - `somersault`, `twist` [rev] and `tilt` [deg] of the root, as in `root_angles`
@@ -80,12 +81,14 @@ def measure_flight(motion: Motion, model: BodyModel, window: int = WINDOW) -> xr
     import xarray as xr
 
     com, variance = centres_of_mass(motion, model)
+    com_sd = _whole_sd(motion, com, variance)
     momentum, momentum_variance = angular_momenta(motion, model, window)
     somersault, tilt, twist = root_angles(motion).deg.T
     axes, units = ("time", "space"), "kg m2/s"
     variables = {
         "com": (axes, com, {"units": "m", "frame": "world"}),
-        "com_sd": (axes, standard_deviation(variance), {"units": "m", "frame": "world"}),
+        "com_sd": (axes, com_sd, {"units": "m", "frame": "world"}),
+        "com_sd_frame": (axes, standard_deviation(variance), {"units": "m", "frame": "world"}),
         "angular_momentum": (axes, momentum, {"units": units, "frame": "world", "about": "centre of mass"}),
         "angular_momentum_sd": (axes, standard_deviation(momentum_variance), {"units": units, "frame": "world"}),
         "somersault": ("time", somersault / 360, {"units": "rev"}),
@@ -112,7 +115,7 @@ def state_flight(motion: Motion, model: BodyModel) -> tuple[xr.Dataset, WrongFal
 
 
 def centres_of_mass(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
-    """Return `com` of `measure_flight` and its variances, both (n, 3) [m, m2]; raises as that does."""
+    """Return `com` of `measure_flight` and its variances of single frames, (n, 3) [m, m2]; raises as that does."""
     require_body(motion, model)
     missing = [segment.name for segment in model.segments if segment.inertia is None]
     if missing:
@@ -122,6 +125,12 @@ def centres_of_mass(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
         com[row], jacobian = centre_of_mass(model.with_pose(motion.pose(row)))
         variance[row] = propagate_variances(jacobian, limit_rotation_variance(motion.covariance[row]))
     return _as_it_falls(motion, com, variance)
+
+
+def state_centres_of_mass(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
+    """Return `com` and `com_sd` of `measure_flight`, both (n, 3) [m]; raises as that does."""
+    com, variance = centres_of_mass(motion, model)
+    return com, _whole_sd(motion, com, variance)
 
 
 def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
@@ -166,9 +175,21 @@ def wrong_flight(motion: Motion, table: xr.Dataset) -> WrongFall | None:
     rows = np.flatnonzero(motion.has_pose)
     if len(rows) < 2:
         return None
-    com, sd = (table[name].to_numpy()[rows] for name in ("com", "com_sd"))
+    com, sd = (table[name].to_numpy()[rows] for name in ("com", "com_sd_frame"))
     variance = np.where(np.isfinite(sd[:, 2]), sd[:, 2], UNKNOWN_SD_M) ** 2
     return find_wrong_fall(motion.time_s[rows], com, motion.R[rows], variance)
+
+
+def _whole_sd(motion: Motion, com: Array, variance: Array) -> Array:
+    """Return the sd (n, 3) [m] of a centre of mass (n, 3) [m]: of single frames, and of the root's lasting errors.
+
+    It moves and turns with the root: by the rotation vector w it moves by w x arm.
+    """
+    if motion.lasting is None:
+        return standard_deviation(variance)
+    turned = np.cross(np.eye(3), (com - motion.position)[:, None]).swapaxes(-1, -2)
+    jacobian = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=-1)
+    return standard_deviation(variance + np.einsum("nij,njk,nik->ni", jacobian, motion.lasting, jacobian))
 
 
 def _as_it_falls(motion: Motion, com: Array, variance: Array) -> tuple[Array, Array]:

@@ -143,7 +143,7 @@ def smooth_landmarks(
     covariance = np.where(np.eye(3, dtype=bool), sd[..., None, None] ** 2, 0.0)
     if has_inertias(model):
         table = measure_flight(motion, model)
-        com, com_sd = (table[name].transpose("time", "space").to_numpy() for name in ("com", "com_sd"))
+        com, com_sd = (table[name].transpose("time", "space").to_numpy() for name in ("com", "com_sd_frame"))
         points = np.concatenate([points, com[:, None]], axis=1)
         diagonal = np.where(np.eye(3, dtype=bool), com_sd[:, None, :] ** 2, 0.0)
         covariance, names = np.concatenate([covariance, diagonal[:, None]], axis=1), [*names, CENTRE_OF_MASS]

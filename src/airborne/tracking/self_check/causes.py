@@ -54,6 +54,8 @@ class LikelyCause:
     def sentence(self) -> str:
         """Say it, with the causes that cannot be told apart from it."""
         text = _describe(self.subject, self.kind, self.value, self.sd)
+        if self.kind == "time_s" and self.is_alarm:
+            text += f" (its `offset_s` should be {abs(self.value):.4f} s {_larger(self.value)})"
         if self.alternatives:
             text += f"; or {'; or '.join(self.alternatives)}: these cannot be told apart"
         return text
