@@ -15,9 +15,9 @@ from airborne.errors import BodyError
 from airborne.types import Array
 
 # chosen on 40 synthetic starts: the search's postures, 8 degrees off, points 15 mm off, segments 5 %. Right sides left
-# 9 to 18 mm, one 27, and no exchange brought that below a share of 0.93, nor the one over 20 mm below 1.22. Of exchanged
-# arms and whole legs 97 to 100 % lie beyond both; of ankles or knees, of legs often side by side, 82 to 93 %; of all
-# from the knees down, which turned thighs fit as well, 35 %
+# 9 to 18 mm, one 27, and no exchange brought that below a share of 0.93, nor the one over 20 mm below 1.22. Exchanged
+# arms or whole legs lie beyond both in 97 to 100 %; ankles or knees, of legs often side by side, in 82 to 93 %; all
+# from the knees down, which turned thighs fit as well, in 35 %
 _SUSPECT_M, _EXCHANGED_SHARE = 0.02, 0.7
 _KINDS = {  # what may be exchanged: in words, and the stems of the landmarks; single ones as slips of a table
     "": ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "hand"),
