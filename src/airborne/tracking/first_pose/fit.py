@@ -47,6 +47,11 @@ class FirstPose:
     exchange: str = ""  # what says that left and right of the body, its legs or its arms are exchanged
 
     @property
+    def plain_notes(self) -> tuple[str, ...]:
+        """The notes that are no doubts."""
+        return tuple(note for note in self.notes if note not in self.doubts)
+
+    @property
     def size_notes(self) -> tuple[str, ...]:
         """What says that the body is larger or smaller than the points, which the self-check of a run says too."""
         return () if self.wrong_size is None else (self.wrong_size.sentence,)
