@@ -38,5 +38,7 @@ def test_it_is_refused_by_check_and_track(tmp_path, capsys, monkeypatch):
 def test_one_camera_that_shows_the_start_is_enough(tmp_path, monkeypatch, dark):
     stand_in(monkeypatch)
     path = trial_with(tmp_path / "trial", dark)
-    assert not any("dark" in mistake for mistake in check_trial(path).mistakes)
+    checks = check_trial(path)
+    assert not any("dark" in mistake for mistake in checks.mistakes)
+    assert any("images of left in frame 2 are black" in doubt for doubt in checks.doubts) == ("right" not in dark)
     assert len(track_trial(read_trial(path), tmp_path / "run", pictures=False).motion) == 4

@@ -1,5 +1,6 @@
 """`airborne check`: all mistakes of a trial at once, and nothing tracked; and the first frame alone."""
 
+import json
 import re
 import shutil
 from dataclasses import replace
@@ -12,11 +13,14 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.cameras import Rig, read_rig, write_rig
 from airborne.cli import main
 from airborne.errors import MistakesError, ResultError
+from airborne.run import check
 from airborne.run.check import check_trial
 from airborne.run.track import track_trial
+from airborne.tracking.first_pose.body_size import WrongSize
 from airborne.trial.file import read_trial
 from airborne.video import inspect
 from tests.support.clips import write_clip
+from tests.support.commands import in_process
 from tests.support.places import ROOT
 from tests.support.players_trial import write_trial
 from tests.support.run_files import files_of
@@ -233,6 +237,19 @@ def test_a_camera_that_is_turned_away_from_the_start_is_noted(folder):
     note = "note: the start pose lies outside the image of cam2; where it should show, check the calibration"
     checks = check_trial(folder / "trial.toml")
     assert note in checks.well and not checks.mistakes
+
+
+def test_doubts_of_the_start_take_the_place_of_no_mistakes(folder, capsys, monkeypatch):
+    crossed, found = "start: left and right look exchanged", check.find_first_pose
+    said = {"notes": ("start: first pose found", crossed), "doubts": (crossed,), "wrong_size": WrongSize(0.12, 0.03)}
+    monkeypatch.setattr(check, "find_first_pose", lambda *args: replace(found(*args), **said))
+    assert in_process("check", folder / "trial.toml") == 0
+    out, err = capsys.readouterr()
+    assert out.splitlines()[-1].startswith("2 doubts: ") and "exchanged" not in out.replace("were exchanged", "")
+    assert f"airborne: doubt: {crossed}" in err and "a body 12 ± 3 % larger" in " ".join(err.split())
+    assert in_process("check", folder / "trial.toml", "--json") == 0
+    checked = json.loads(capsys.readouterr().out)
+    assert not checked["mistakes"] and checked["doubts"] == [crossed, WrongSize(0.12, 0.03).sentence]
 
 
 def test_lines_are_reported_as_they_are_found(folder):

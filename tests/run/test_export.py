@@ -18,9 +18,11 @@ from airborne.body.files import write_body
 from airborne.errors import ResultError
 from airborne.evaluation import read_joint_paths
 from airborne.export.takes import with_axis_markers
+from airborne.io.folder_lock import sole_writer
 from airborne.motion import MotionWriter, landmarks, measure_flight, read_motion, read_players
 from airborne.motion.covariance_file import write_covariances
 from airborne.run import export
+from airborne.run.evaluate import assess
 from airborne.run.export import EXPORT_FORMATS, export_run
 from airborne.tracking import Estimate, Status
 from tests.support.export_scenes import BOX, PERSON
@@ -164,16 +166,23 @@ def test_without_pyarrow_parquet_is_left_out_and_refused_where_asked_for(players
     exported = export_run(players_run, tmp_path)
     assert "block.parquet" not in names(exported) and "block.csv" in names(exported)
     advice = "Parquet needs pyarrow, which is not installed: pip install pyarrow"
-    assert exported.notes == (UNCERTAIN, f"left out parquet. {advice}")
+    assert exported.notes == (UNCERTAIN, f"not written: {advice}")
     with pytest.raises(ResultError, match=re.escape(advice)):
         export_run(players_run, tmp_path, ["csv", "parquet"])
 
 
-def test_where_nothing_was_found_there_is_nothing_to_export(tmp_path):
+def test_a_run_that_has_only_begun_is_told_from_none(tmp_path):
+    with sole_writer(tmp_path), pytest.raises(ResultError, match="the run there has no frame yet"):
+        export_run(tmp_path)
+
+
+def test_where_nothing_was_found_there_is_nothing_to_export_or_to_compare(tmp_path):
     folder = write_body_run(tmp_path / "run", tumbling(3, model=BOX, lost=(0, 1, 2)), BOX)
     with pytest.raises(ResultError, match="found in no frame"):
         export_run(folder)
     assert not (folder / "export").exists()
+    with pytest.raises(ResultError, match="found in no frame, so there is nothing to compare"):
+        assess(folder, tmp_path / "truth.csv", None)
 
 
 def test_the_centre_of_mass_is_that_of_the_whole_run_with_lasting_errors(tmp_path):

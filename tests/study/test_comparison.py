@@ -180,7 +180,7 @@ def test_failed_trials_are_named_in_the_text(tmp_path):
 def test_a_folder_without_a_batch_is_one_line(tmp_path):
     with pytest.raises(AirborneError, match=r"has no trials\.csv; .* a batch that was stopped again"):
         read_study(tmp_path)
-    with pytest.raises(AirborneError, match="cannot be read"):
+    with pytest.raises(AirborneError, match="nowhere does not exist; give the folder of a batch"):
         read_study(tmp_path / "nowhere")
     (tmp_path / "trials.csv").write_text("trial\nx\n")
     with pytest.raises(AirborneError, match="lacks condition, error, folder, status"):

@@ -24,7 +24,6 @@ from airborne.body.landmark_fit import (
     minimise,
 )
 from airborne.body.model import BodyModel, Pose
-from airborne.body.shaping import with_segment_lengths
 from airborne.body.sides import other_side
 from airborne.errors import BodyError
 from airborne.geometry.rotations import angles_from_matrix
@@ -32,14 +31,6 @@ from airborne.types import Array
 
 CORE = ("hip_left", "hip_right", "shoulder_left", "shoulder_right")  # they give a person's position and heading
 _LEAST_SD_M, _MOST_SD_M = 0.003, 0.05  # of a landmark; between them, the RMS of the fit
-# with the lengths of the targets: an RMS over this that falls below this share where left and right are exchanged. Of
-# the search's postures, 8 degrees and 15 mm off, sides as named leave 5 to 15 mm; exchanged ones 27 to 171 mm
-_SUSPECT_M, _EXCHANGED_SHARE = 0.02, 0.7
-_EXCHANGED = {  # what may have the wrong side: in words, and the stems of the landmarks
-    "": ("hip", "knee", "ankle", "foot", "shoulder", "elbow", "wrist", "hand"),
-    " of the legs": ("hip", "knee", "ankle", "foot"),
-    " of the arms": ("shoulder", "elbow", "wrist", "hand"),
-}
 _LEAST_WIDTH_M = 0.02  # second principal sd: landmarks on a line leave the rotation about it open
 _SHARES = np.linspace(-0.96, 0.96, 7)  # of a joint's half range: where a limb's search starts
 _FIRST_STEPS, _N_GO_ON = 5, 2  # of a limb: from every start; starts that go on: half the time of all, RMS + 0.1 mm
@@ -53,8 +44,6 @@ class PoseFit:
     pose: Pose
     residual_m: dict[str, float]  # landmark -> distance from its target [m]; NaN without a target
     rms_m: float  # over the landmarks with a target [m]
-    note: str | None = None  # what looks wrong with the targets, in a line
-    is_exchanged: bool = False  # left and right of all of them
 
 
 def fit_pose(
@@ -63,14 +52,14 @@ def fit_pose(
     *,
     weights: Mapping[str, float] | None = None,
     start: Pose | None = None,
-    seeks_swap: bool = True,
+    n_restarts: int = _N_RESTARTS,
 ) -> PoseFit:
     """Find the pose whose landmarks lie nearest to targets: landmark -> (3,) world [m], NaN where unknown.
 
     `weights` are those of each landmark's squared distance, 1 where not named. The search starts from `start`; without
     one it needs both hips and both shoulders, or, for a body without these, any three landmarks not on a line, and
-    unless `seeks_swap` is False, a note says where left and right seem exchanged. Raises BodyError for landmarks that
-    the body does not have, and where too few have targets.
+    tries the limbs anew up to `n_restarts` times. Raises BodyError for landmarks that the body does not have, and where
+    too few have targets.
     """
     names = [landmark.name for landmark in model.landmarks]
     unknown = [name for name in targets if name not in names]
@@ -82,42 +71,8 @@ def fit_pose(
     root_weights = np.sqrt([(weights or {}).get(name, 1.0) for name in names])
     problem = LandmarkProblem(model, positions, root_weights, _LEAST_SD_M)
     _check(problem, names, has_start=start is not None)
-    pose, residual_m, rms_m = _fit(problem, start)
-    is_suspect = seeks_swap and start is None and rms_m > _SUSPECT_M
-    note, is_exchanged = _find_exchange(problem) if is_suspect else (None, False)
-    return PoseFit(pose, dict(zip(names, residual_m.tolist(), strict=True)), rms_m, note, is_exchanged)
-
-
-def _find_exchange(problem: LandmarkProblem) -> tuple[str | None, bool]:
-    """Say which landmarks fit clearly better with left and right exchanged, and whether it is all of them.
-
-    The body has the targets' own lengths.
-    """
-    names = [landmark.name for landmark in problem.model.landmarks]
-    try:
-        lengths = fit_lengths(problem.model, problem.targets[None])
-        problem = replace(problem, model=with_segment_lengths(problem.model, lengths))
-    except BodyError:  # lengths of no person
-        pass
-    if (as_named_m := _fit(problem, None)[2]) <= _SUSPECT_M:
-        return None, False
-    others_m = {}
-    for words, stems in _EXCHANGED.items():
-        is_of_pair = [name.rpartition("_")[0] in stems and other_side(name) in names for name in names]
-        other = [
-            names.index(other_side(name)) if own else i
-            for i, (name, own) in enumerate(zip(names, is_of_pair, strict=True))
-        ]
-        if any(is_of_pair):
-            others_m[words] = _fit(replace(problem, targets=problem.targets[other]), None, n_restarts=0)[2]
-    best = min(others_m, key=others_m.__getitem__, default=None)
-    if best is None or others_m[best] >= _EXCHANGED_SHARE * as_named_m:
-        return None, False
-    note = (
-        f"left and right{best} look exchanged: landmarks {as_named_m * 1e3:.0f} mm off as named, "
-        f"{others_m[best] * 1e3:.0f} mm the other way; check the points' names, and that no image is mirrored"
-    )
-    return note, not best
+    pose, residual_m, rms_m = _fit(problem, start, n_restarts)
+    return PoseFit(pose, dict(zip(names, residual_m.tolist(), strict=True)), rms_m)
 
 
 def fit_lengths(model: BodyModel, joints: Array) -> dict[str, float]:
@@ -163,7 +118,7 @@ def _trunk_ratios(model: BodyModel, core: Array) -> dict[str, list[Array]]:
     return ratios
 
 
-def _fit(problem: LandmarkProblem, start: Pose | None, *, n_restarts: int = _N_RESTARTS) -> tuple[Pose, Array, float]:
+def _fit(problem: LandmarkProblem, start: Pose | None, n_restarts: int) -> tuple[Pose, Array, float]:
     """Return the pose, each landmark's distance (landmarks,) [m] and their RMS, targets only [m]."""
     n_joints = len(problem.model.segments) - 1
     if start is None:

@@ -282,9 +282,9 @@ def _pose_from_landmarks(
     """Fit a pose to landmarks; from a pose `near` by, unless it leads to none that is close."""
     pairs = zip(model.landmarks, _landmarks(model, observation.landmarks), strict=True)
     targets = {mark.name: at for mark, at in pairs if np.isfinite(at).all()}
-    fit = fit_pose(model, targets, weights=weights, start=near, seeks_swap=False)
+    fit = fit_pose(model, targets, weights=weights, start=near)
     if near is not None and fit.rms_m > _FAR_RMS_M:
-        return fit_pose(model, targets, weights=weights, seeks_swap=False).pose
+        return fit_pose(model, targets, weights=weights).pose
     return fit.pose
 
 

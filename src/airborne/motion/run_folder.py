@@ -79,6 +79,8 @@ def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
     Raises ResultError if the folder holds none, the body is missing, its record is damaged, its table was cut, or the
     errors that its self-check found to last are missing.
     """
+    if not (folder / MOTION).is_file() and find_writer(folder) is not None:
+        raise ResultError(f"{folder}: the run there has no frame yet; wait for its first")
     if not (folder / MOTION).is_file():
         raise ResultError(f"{folder} holds no run; expected the output folder of `airborne track`")
     check_record(folder)

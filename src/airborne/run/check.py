@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
 from typing import TypeVar
 
@@ -29,9 +30,11 @@ from airborne.run.players_tracker import player_starts, players_tracker_of, star
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
+from airborne.video.outages import DARK_LEVEL, is_dark
 
 _T = TypeVar("_T")
 _UNEQUAL = 0.05  # chosen: of the first camera's duration; cameras stopped one after the other differ by less
+_DIM_LEVEL = 2 * DARK_LEVEL  # chosen: an image at 6 % of its brightness has no brighter pixel
 _NO_MIX_UP = "videos: no sign at the start that cameras' videos were exchanged"
 _UNDECIDED = (
     "videos: what moves at the start does not show whether any were exchanged or mirrored; tracking may show it"
@@ -39,12 +42,13 @@ _UNDECIDED = (
 
 
 class Checks:
-    """What was found: a line for each thing that is well, and a line for each mistake."""
+    """What was found: a line for each thing that is well, for each mistake, and for each doubt."""
 
     def __init__(self, report: Callable[[str], None]) -> None:
         """Start with nothing found; `report` is called with each line for what is well."""
         self.well: list[str] = []
         self.mistakes: list[str] = []
+        self.doubts: list[str] = []  # what may be right, but makes frames uncertain or leaves little to be tracked
         self._report = report
 
     def add(self, line: str) -> None:
@@ -160,9 +164,17 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         checks.mistakes.append(str(past_the_end_error(trial, recording)))
         return
     with closing(iter(recording)) as frames:
-        if error := dark_start_error(trial, frames):
+        first = list(islice(frames, 1))
+        if error := dark_start_error(trial, chain(first, frames)):
             checks.mistakes.append(str(error))
             return
+    views = [view for each in first for view in each.views if view is not None]
+    dark = [view.camera.name for view in views if is_dark(view, _DIM_LEVEL)]
+    if dark:
+        checks.doubts.append(
+            f"the images of {', '.join(dark)} in frame {first[0].index} are black or nearly: brighten the video, start "
+            "where it shows something, or leave the camera out"
+        )
     for mask in trial.mask:
         if recording.n_images is not None and mask.first >= recording.n_images:
             checks.add(f"note: [[mask]] of {mask.camera} begins at frame {mask.first}, after the recording's end")
@@ -191,8 +203,9 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         model = trial.model()
         found = checks.attempt(
             lambda: find_first_pose(trial, model, recording.rig, opened.detections),
-            lambda found: "; ".join([f"start: frame {trial.start.frame}", *found.notes, *found.size_notes]),
+            lambda found: "; ".join([f"start: frame {trial.start.frame}", *found.plain_notes]),
         )
+        checks.doubts += [] if found is None else [*found.doubts, *found.size_notes]
         if found is not None and trial.start.detections is None:  # a network's mistakes are not the user's
             checks.mistakes += [f"{trial.name}: {mistake}" for mistake in found.mistakes]
         unseen = out_of_sight(model.with_pose(found.pose), recording.rig) if found is not None else ""

@@ -70,6 +70,8 @@ def assess(
             "nothing to compare with; give a truth.csv, --digitised, --joints, --joint-angles, or --repeat with a run"
         )
     motion, model = read_body_run(folder)
+    if not motion.has_pose.any():
+        raise ResultError(f"{folder}: the body was found in no frame, so there is nothing to compare; track again")
     symmetry = symmetries(model)
     comparisons: dict[str, MotionComparison | DigitisedComparison | JointComparison] = {}
     true_poses = clicked = None

@@ -69,7 +69,7 @@ def export_run(
     jitter, notes = max(take.jitter_s * float(take.rate) for take in read.takes), list(read.notes)
     if "parquet" in wanted and not CAN_WRITE_PARQUET:
         wanted.remove("parquet")
-        notes.append(f"left out parquet. {_NO_PARQUET}")
+        notes.append(f"not written: {_NO_PARQUET}")
     if jitter > _LARGEST_JITTER:
         unfit = [format for format in wanted if format in _UNIFORM_FORMATS]
         reason = f"frames are off an even rate by up to {jitter:.2f} frames"

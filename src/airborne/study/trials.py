@@ -72,7 +72,10 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
     The athlete of a run of players is the one who jumped highest, where no label says it. Raises ResultError where the
     folder holds no table, or none of the trials can be compared.
     """
-    if folder.is_dir() and not (folder / TABLE).exists():
+    if not folder.is_dir():
+        found = "is a file" if folder.exists() else "does not exist"
+        raise ResultError(f"{folder} {found}; give the folder of a batch")
+    if not (folder / TABLE).exists():
         raise ResultError(
             f"{folder} has no {TABLE}; give the folder of a batch, or give a batch that was stopped again, to its end"
         )

@@ -75,12 +75,12 @@ class Outages:
                 yield f"{name}: {kind} at {runs.n_frames} of {self._n_times} frames: {runs.describe()}"
 
 
-def is_dark(view: View) -> bool:
-    """Say whether an image shows nothing: no bright pixel in a grid of patches."""
+def is_dark(view: View, level: int = DARK_LEVEL) -> bool:
+    """Say whether an image shows nothing: no pixel as bright as `level` in a grid of patches."""
     width, height = view.camera.size
     size = min(_PATCH_PX, width, height)
     for i, j in product(range(_N_PATCHES), repeat=2):
         x, y = i * (width - size) // (_N_PATCHES - 1), j * (height - size) // (_N_PATCHES - 1)
-        if view.crop((x, y, x + size, y + size)).max() >= DARK_LEVEL:
+        if view.crop((x, y, x + size, y + size)).max() >= level:
             return False
     return True

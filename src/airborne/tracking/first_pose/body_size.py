@@ -52,7 +52,7 @@ def find_wrong_size(
 
     def cost_m2(size: float) -> float:  # the targets are scaled, not the body
         scaled = {name: target / size for name, target in targets.items()}
-        return (size * fit_pose(model, scaled, weights=weights, start=fit.pose, seeks_swap=False).rms_m) ** 2
+        return (size * fit_pose(model, scaled, weights=weights, start=fit.pose).rms_m) ** 2
 
     found = minimize_scalar(cost_m2, bounds=(_LEAST, _MOST), method="bounded", options={"xatol": _STEP})
     value = float(found.x) - 1

@@ -79,6 +79,6 @@ def _from_positions(expected: Pose, evidence: PoseEvidence) -> list[Pose]:
         weights |= dict.fromkeys(missing, _EXPECTED_WEIGHT)
         targets = {**targets, **missing}
     try:
-        return [fit_pose(model, targets, weights=weights, seeks_swap=False).pose]
+        return [fit_pose(model, targets, weights=weights).pose]
     except BodyError:
         return []

@@ -18,6 +18,7 @@ from airborne.cameras.skeletons import LANDMARK_RECIPES, SKELETONS
 from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.tracking.first_pose.body_size import WrongSize, find_wrong_size
+from airborne.tracking.first_pose.exchange import find_exchange
 from airborne.types import Array
 
 _ROUNDING_RAD = 1e-9  # an angle beyond its limit by less is at it
@@ -43,7 +44,12 @@ class FirstPose:
     mistakes: tuple[str, ...] = ()  # points that cannot be right
     points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], those that were given
     wrong_size: WrongSize | None = None  # of the body, by the points
-    exchange: str = ""  # what says that left and right of the whole body are exchanged
+    exchange: str = ""  # what says that left and right of the body, its legs or its arms are exchanged
+
+    @property
+    def plain_notes(self) -> tuple[str, ...]:
+        """The notes that are no doubts."""
+        return tuple(note for note in self.notes if note not in self.doubts)
 
     @property
     def size_notes(self) -> tuple[str, ...]:
@@ -113,7 +119,9 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     worst = max(off_m, key=off_m.__getitem__)
     missing = ", ".join(name for name, point in targets.items() if np.isnan(point).any())
     given = {name: point for name, point in targets.items() if np.isfinite(point).all()}
-    wrong_size = None if fit.is_exchanged else find_wrong_size(model, given, LANDMARK_WEIGHTS, fit)
+    found = find_exchange(model, given, LANDMARK_WEIGHTS, fit)
+    exchange = f"{where}: {found.sentence}" if found else ""
+    wrong_size = None if found else find_wrong_size(model, given, LANDMARK_WEIGHTS, fit)
     doubt = "; check the points and the body's size" if fit.rms_m > _DOUBTFUL_RMS_M else ""
     mistakes = [
         f"{where}: {name} lies {distance:.1f} m from where the body can have it; correct it, or the body's size"
@@ -124,10 +132,9 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
         f"{where}: first pose found; landmarks are {fit.rms_m * 1e3:.0f} mm off (RMS), "
         f"the largest is {worst} with {off_m[worst] * 1e3:.0f} mm{doubt}",
         f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
-        f"{where}: {fit.note}" if fit.note else "",
+        exchange,
     ]
-    exchange = f"{where}: {fit.note}" if fit.note and fit.is_exchanged else ""
-    doubts = [note for note, is_doubt in zip(notes, (doubt, "", fit.note), strict=True) if is_doubt]
+    doubts = [note for note, is_doubt in zip(notes, (doubt, "", exchange), strict=True) if is_doubt]
     said = tuple(note for note in notes if note)
     return FirstPose(fit.pose, said, tuple(doubts), tuple(mistakes), given, wrong_size, exchange)
 
