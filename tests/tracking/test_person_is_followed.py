@@ -16,7 +16,7 @@ def test_every_order_of_fitting_finds_the_person_from_a_start_three_degrees_off(
     assert off_mm.mean() > 20
     estimates = track(SCENE, range(5), tracker(SCENE, start, method=method))
     assert statuses(estimates) == ["tracked"] * 5
-    assert mean_errors_mm(SCENE, estimates).max() < 4.5
+    assert mean_errors_mm(SCENE, estimates).max() < 5.0
     for estimate in estimates:
         assert estimate.n_views == 3
         assert HUMAN.is_within_limits(estimate.pose, slack_rad=np.radians(3.0))
