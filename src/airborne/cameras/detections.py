@@ -211,6 +211,6 @@ def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Arra
             if set(recipe) <= set(names):
                 between = points[..., [names.index(name) for name in recipe], :]
                 found = np.einsum("...pi,p->...i", between, np.array(list(recipe.values())))
-                known = landmarks.get(landmark, np.full_like(found, np.nan))
-                landmarks[landmark] = np.where(np.isnan(known), found, known)
+                known = landmarks.get(landmark)
+                landmarks[landmark] = found if known is None else np.where(np.isnan(known), found, known)
     return landmarks

@@ -35,7 +35,10 @@ Look = Callable[[Sequence[Pose]], Sequence[ImageEvidence]]  # one pass over the 
 # people who tuck and open in 0.17 s joints err by 10.6 and 16.0 mm without constant offsets, with 30 by 12.4 and 18.6,
 # and knees open too early and too slowly; on four slower people both err alike
 _DENSITY = 120.0**2 / 50
-_ROOT_DENSITY = 30.0**2 / 50  # of the root, m/s2 and rad/s2: with 120 its rotation errs by 3 % more on those people
+# of the root, m/s2 and rad/s2, and of hands, feet and head, whose turns are seen least: with 120 the root's rotation
+# errs by 3 % more on those people, and joints by 1 %
+_SLOW_DENSITY = 30.0**2 / 50
+_SLOW = ("head", "hand_left", "hand_right", "foot_left", "foot_right")
 _TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: with 30 rad/s2 joints err by 0.7 % more; with 5 the largest do
 # [m2/s3] of the centre of mass's in flight, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2 the least errors
 # of the same, four of them tracked with bodies of other lengths and girths
@@ -185,8 +188,8 @@ def acceleration_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, gr
     values = np.diff(rate, axis=0) / between_s[..., None]
     values[:, 0] -= gravity_m_s2
     is_trunk = [False] * 2 + [segment.name in TRUNK for segment in model.segments[1:]]
-    density = np.where(is_trunk, _TRUNK_DENSITY, _DENSITY)
-    density[:2] = _ROOT_DENSITY
+    is_slow = [True] * 2 + [segment.name in _SLOW for segment in model.segments[1:]]
+    density = np.where(is_trunk, _TRUNK_DENSITY, np.where(is_slow, _SLOW_DENSITY, _DENSITY))
     sd = np.sqrt(density / between_s)
     return JoiningRows(rows / sd[..., None, None, None], values / sd[..., None])
 
