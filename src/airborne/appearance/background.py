@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airborne.kernels import kernel
 
 START_SD = 6.0  # [grey levels] of a pixel that was observed once
-TILE_PX = 128  # side of the tiles that a learned background shares with the one before
+TILE_PX = 128  # chosen: side of the tiles that a learned background shares with the one before
 _MIN_RATE = 0.05  # least weight of a pixel's newest observation, so that slow changes of light are followed
 
 

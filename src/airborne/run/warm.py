@@ -42,7 +42,7 @@ from airborne.video import Frames, View
 from airborne.video.crops import conversion_of
 
 _N_FRAMES = 4  # the first is found, the second followed, later ones also predicted
-_SIZE = (64, 48)  # of the image of which a part is converted [px]
+_SIZE = (64, 48)  # chosen: of the image of which a part is converted [px]
 _LEG_POINTS = {"hip": 0.9, "knee": 0.5, "ankle": 0.1}  # heights of a player's joints [m]
 _AT_M = {"left": -0.12, "right": 0.12}  # where the sides are
 

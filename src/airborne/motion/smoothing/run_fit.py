@@ -31,12 +31,12 @@ from airborne.types import Array
 
 Look = Callable[[Sequence[Pose]], Sequence[ImageEvidence]]  # one pass over the images of a run, a pose each frame
 
-# spectral densities of accelerations [m2/s3, rad2/s3]: of limbs an sd of 120 rad/s2 at 50 frames/s. On two synthetic
-# people who tuck and open in 0.17 s joints err by 10.6 and 16.0 mm without constant offsets, with 30 by 12.4 and 18.6,
-# and knees open too early and too slowly; on four slower people both err alike
+# spectral densities of accelerations [m2/s3, rad2/s3], chosen: of limbs an sd of 120 rad/s2 at 50 frames/s. On two
+# synthetic people who tuck and open in 0.17 s joints err by 10.6 and 16.0 mm without constant offsets, with 30 by 12.4
+# and 18.6, and knees open too early and too slowly; on four slower people both err alike
 _DENSITY = 120.0**2 / 50
-# of the root, m/s2 and rad/s2, and of hands, feet and head, whose turns are seen least: with 120 the root's rotation
-# errs by 3 % more on those people, and joints by 1 %
+# chosen, of the root, m/s2 and rad/s2, and of hands, feet and head, whose turns are seen least: with 120 the root's
+# rotation errs by 3 % more on those people, and joints by 1 %
 _SLOW_DENSITY = 30.0**2 / 50
 _SLOW = ("head", "hand_left", "hand_right", "foot_left", "foot_right")
 _TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: with 30 rad/s2 joints err by 0.7 % more; with 5 the largest do

@@ -13,8 +13,8 @@ from airborne.tracking.model_based.render_model import ViewBuffers
 from airborne.types import Array
 
 # how far a person's segment lies from the surface that fits its image along each axis, and is turned from it about its
-# middle: of 2.5, 4 and 6 deg the least with which two sds hold 88 % of the joints' rotations of four synthetic people
-# whose joints lie elsewhere; with 7 mm and no turn they hold 85 %, and the positions alike
+# middle: chosen, of 2.5, 4 and 6 deg the least with which two sds hold 88 % of the joints' rotations of four synthetic
+# people whose joints lie elsewhere; with 7 mm and no turn they hold 85 %, and the positions alike
 SHAPE_SD_M, SHAPE_TURN_SD_RAD = 0.005, np.radians(4.0)
 # the turn of the head, which is round, and of the pelvis, which flesh and clothes hide, all run long: chosen, two sds
 # hold 92 % of the turns of those people's heads, with 4 deg 86 %, and of two quick people's pelvises 85 %, not 80. In a
