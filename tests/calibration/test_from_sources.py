@@ -36,7 +36,7 @@ def silent(what, done, total):
 def recordings(tmp_path_factory):
     """A folder with videos and pictures of a board, control points and a calibration."""
     folder = tmp_path_factory.mktemp("recordings")
-    pictures = board_pictures(RIG, wave_board(24))
+    pictures = board_pictures(RIG, wave_board(16))
     write_videos(folder, pictures)
     (folder / "pictures").mkdir()
     write_pictures(folder / "pictures", pictures)

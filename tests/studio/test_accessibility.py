@@ -15,6 +15,9 @@ from tests.support.studio import fork_studio
 
 VIDEO, N = (320, 240), 6  # [px], pictures
 SIZES = ((1024, 700), (3840, 2160))  # of the window, the smallest and the largest
+HAS_GROWN = """height => [...document.querySelectorAll(".q-layout, .q-page")].every(
+    (each) => parseFloat(each.style.minHeight) === height
+)"""  # Quasar gives these the height of the window, a moment after it has it: on a busy machine a later one
 PAGES = {  # and what is there when a page is built
     "": "Use these cameras", "sync": "Same event", "cameras": "focal length", "body": "Use this person",
     "ruler": "How long", "thing": "Use this thing", "start": "Place it by hand", "track": "Track again",
@@ -101,6 +104,7 @@ def faults_by_size(page):
     faults = {}
     for width, height in SIZES:
         page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_function(HAS_GROWN, arg=height)
         page.evaluate("new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))")
         faults[width, height] = layout_faults(page)
     page.set_viewport_size(SIZE)

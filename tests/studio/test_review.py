@@ -1,6 +1,7 @@
 """The page Review in a real browser: the next uncertain frame, a second run, the camera that disagrees."""
 
 import csv
+import io
 import shutil
 from fractions import Fraction
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from airborne.cameras import Rig, camera_looking_at
+from airborne.io.writing import replace_text
 from airborne.studio.outlines import BESIDE_COLOUR
 from tests.support.browser import open_page
 from tests.support.clips import write_clip
@@ -25,15 +27,16 @@ camera = [{{ name = "a", video = "a.mp4" }}]
 
 
 def edit_rows(path, change):
-    """Change the rows of a table."""
+    """Change the rows of a table, which is there whole at every moment: a studio may look at it meanwhile."""
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
         change(row)
-    with path.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    replace_text(path, text.getvalue(), is_durable=False)
 
 
 @pytest.fixture

@@ -17,7 +17,8 @@ SIZE = {"width": 1280, "height": 720}
 MINUTE = 60_000  # ms
 TIMEOUT_MS = 3 * MINUTE  # of a busy machine
 NO_PROXY = "http://127.0.0.1:9"  # where nothing listens; the loopback itself needs none
-BROWSER_FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", f"--proxy-server={NO_PROXY}"]
+NO_SMOOTHING = "--webgl-antialiasing-mode=none"  # of 3D scenes, which a processor draws here
+BROWSER_FLAGS = ["--no-sandbox", "--enable-unsafe-swiftshader", NO_SMOOTHING, f"--proxy-server={NO_PROXY}"]
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from airborne.io.folder_lock import LOCK
 from airborne.studio import field_order
 from airborne.studio.prefetch import Prefetch
 from airborne.studio.writing import FOLDER
+from tests.support.forked_commands import fork_commands
 
 RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
 _FORKS = multiprocessing.get_context("forkserver")
@@ -47,8 +48,8 @@ def open_studio(path: Path, *options: str) -> Iterator[str]:
 def fork_studio(path: Path, *options: str, before: Callable[[], None] | None = None) -> Iterator[str]:
     """Do what `open_studio` does, in a fifth of its time: in a fork of a process that has imported everything.
 
-    It makes no pictures that nobody asks for, and looks at few to show the order of fields. `before`, a function of a
-    module, is called there first.
+    So are the commands that it starts. It makes no pictures that nobody asks for, and looks at few to show the order of
+    fields. `before`, a function of a module, is called there first.
     """
     (ours, out), (ours_of_errors, errors) = (_FORKS.Pipe(duplex=False) for _ in range(2))
     words = ("studio", str(path), "--no-browser", *options)
@@ -86,6 +87,7 @@ def _run_command(
     os.chdir(folder)
     os.environ.pop("PYTEST_CURRENT_TEST", None)  # NiceGUI looks at it
     Prefetch.start, field_order._N_LOOKED_AT = (lambda prefetch: None), 2
+    fork_commands()
     if before is not None:
         before()
     sys.argv = ["airborne", *words]

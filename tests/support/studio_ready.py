@@ -1,4 +1,4 @@
-"""What a studio loads once it is asked for a page, for the process of which the tests' studios are forks."""
+"""What a studio and its commands load once they are asked to, for the process of which those of the tests are forks."""
 
 import gc
 from importlib import import_module
@@ -15,8 +15,12 @@ PARTS = (
     *("button", "card", "checkbox", "dialog", "expansion", "input", "keyboard", "notification", "number", "select"),
     *("timer", "tooltip"),
 )
+TRACKING = (
+    *("matplotlib.backends.backend_agg", "pyarrow.parquet", "airborne.export.figures", "airborne.export.sheet"),
+    *("airborne.run.track", "airborne.run.find", "airborne.run.find_players", "airborne.run.export"),
+)
 
-for name in SERVING:
+for name in (*SERVING, *TRACKING):
     import_module(name)
 for name in PARTS:
     import_module(f"nicegui.elements.{name}")

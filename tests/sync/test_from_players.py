@@ -16,7 +16,7 @@ OFFSET_S = np.array(AHEAD) / FPS
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory):
     hall = Hall({"anna": hop(late_s=-0.2)})  # squats already
-    return read_trial(hall.write_trial(tmp_path_factory.mktemp("hall"), 36, ahead=AHEAD))
+    return read_trial(hall.write_trial(tmp_path_factory.mktemp("hall"), 24, ahead=AHEAD))
 
 
 def assert_found(offsets):

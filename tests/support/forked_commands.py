@@ -1,0 +1,67 @@
+"""The commands that a studio starts, as forks of the process that has imported everything: no test is of the import."""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import SimpleNamespace
+from typing import IO, Any
+
+from airborne.cli import main
+from airborne.studio import commands
+
+_FORKS = multiprocessing.get_context("forkserver")
+_RUN = commands._RUN  # the code of the command line
+
+
+class ForkedCommand:
+    """What `subprocess.Popen` is to a studio's command: its words are those after the code of the command line."""
+
+    def __init__(
+        self, words: Sequence[str], *, cwd: Path, stdin: int, stdout: int, stderr: IO, env: Mapping[str, str]
+    ) -> None:
+        ours, out = _FORKS.Pipe(duplex=False)
+        arguments = (tuple(words[3:]), cwd, out, Path(stderr.name), dict(env))
+        self._process = _FORKS.Process(target=_run_words, args=arguments)
+        self._process.start()
+        out.close()
+        self.stdout = os.fdopen(os.dup(ours.fileno()), "rb")
+        ours.close()
+
+    def poll(self) -> int | None:
+        return self._process.exitcode
+
+    def terminate(self) -> None:
+        self._process.terminate()
+
+    def kill(self) -> None:
+        self._process.kill()
+
+    def wait(self, timeout: float | None = None) -> int:
+        self._process.join(timeout)
+        if (code := self._process.exitcode) is None:
+            raise subprocess.TimeoutExpired(self._process.name, timeout or 0.0)
+        return code
+
+
+def fork_commands() -> None:
+    """Let the commands of this process's studio be forks, but for those whose code a test has replaced."""
+    commands.subprocess = SimpleNamespace(**vars(subprocess) | {"Popen": _start})
+
+
+def _start(words: Sequence[str], **options: Any) -> Any:
+    return (ForkedCommand if words[2] == _RUN else subprocess.Popen)(words, **options)
+
+
+def _run_words(words: tuple[str, ...], folder: Path, out: Connection, log: Path, env: Mapping[str, str]) -> None:
+    with log.open("ab") as errors, open(os.devnull) as nothing:
+        for number, file in enumerate((nothing, out, errors)):
+            os.dup2(file.fileno(), number)
+    out.close()
+    os.chdir(folder)
+    os.environ.update(env)
+    sys.argv = ["airborne", *words]
+    main()
