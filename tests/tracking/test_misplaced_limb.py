@@ -70,14 +70,29 @@ def limb_with(name):
 
 
 def test_no_limb_of_the_true_pose_is_misplaced(frame):
-    assert find_misplaced_limbs(frame.render_model, frame.truth, *frame.views(frame.truth)) == []
+    found = find_misplaced_limbs(frame.render_model, frame.truth, *frame.views(frame.truth))
+    assert (found.suspect, found.misplaced) == ([], [])
 
 
 @pytest.mark.parametrize(("name", "turn"), [*FOLDS.items(), *FOREARM.items()])
 def test_limb_that_is_folded_wrong_is_misplaced_and_no_other(frame, name, turn):
     wrong = fold(frame.truth, name, turn)
-    (limb,) = find_misplaced_limbs(frame.render_model, wrong, *frame.views(wrong))
-    np.testing.assert_array_equal(limb, limb_with(name))
+    found = find_misplaced_limbs(frame.render_model, wrong, *frame.views(wrong))
+    for (limb,) in found:
+        np.testing.assert_array_equal(limb, limb_with(name))
+
+
+@pytest.mark.parametrize(("probability", "is_misplaced"), [(0.3, False), (0.0, True)])
+def test_limb_before_what_looks_like_it_is_suspect_and_misplaced_only_before_what_does_not(
+    frame, probability, is_misplaced
+):
+    regions, posteriors = frame.views(frame.truth)
+    part = frame.render_model.draw_parts(frame.render_model.with_pose(frame.truth), regions[0])
+    is_thigh = (part >= 0) & (frame.render_model.segment_of_part[part] == HUMAN.index_of("thigh_right"))
+    posteriors[0] = np.where(is_thigh, np.float32(probability), posteriors[0])
+    found = find_misplaced_limbs(frame.render_model, frame.truth, regions, posteriors)
+    assert [limb.tolist() for limb in found.suspect] == [limb_with("thigh_right").tolist()]
+    assert len(found.misplaced) == is_misplaced
 
 
 @pytest.mark.parametrize("name", FOLDS)

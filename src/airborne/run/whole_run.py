@@ -213,12 +213,13 @@ class _RunImages:
                 self.progress(self._n_read, max(self._n_read, (1 + self.n_steps) * len(self.estimates)))
 
     def _read(self, wanted: Sequence[int]) -> Iterator[Frames]:
-        """Yield frames, which come after those that are held."""
+        """Yield frames, reduced as they are looked at, which come after those that are held."""
         if not wanted:
             return
         n_bytes, all_wanted = sum(frames.n_held_bytes for frames in self._held.values()), set(wanted)
-        for frames in self.reader.forward(wanted[0], wanted[-1] + 1):
-            if frames.index in all_wanted:
+        for read in self.reader.forward(wanted[0], wanted[-1] + 1):
+            if read.index in all_wanted:
+                frames = self.tracker.reduce_frames(read)
                 n_bytes += frames.n_held_bytes
                 if n_bytes <= _MOST_BYTES:
                     self._held[frames.index] = frames

@@ -78,6 +78,10 @@ class CompensatedTracker:
         """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""
         return self._tracker.weigh(state.inner, compensate_offsets(frames, state.past), poses)
 
+    def reduce_frames(self, frames: Frames) -> Frames:
+        """Reduce the images of a body whose joints move, as they are looked at."""
+        return self._tracker.reduce_frames(frames)
+
     def linearise(
         self,
         state: CompensatedState,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import av
+import numpy as np
 
 from airborne.types import Image
 from airborne.video.crops import ColourConversion, conversion_of, rgb_from_part
@@ -19,32 +20,38 @@ _FrameFormat = tuple[str, int, int]
 class _UnconvertedImage:
     """One image of one camera; it implements `airborne.video.frames.LazyImage`."""
 
-    _image: DecodedImage
+    _image: DecodedImage | Image  # as decoded, or once it was converted whole, that
     _facts: VideoFacts
     _undistortion: Undistortion
     _conversions: ConversionCache
-    _whole: Image | None = None
 
     @property
     def n_held_bytes(self) -> int:
-        """How many bytes the planes of the decoded image take, and the converted one."""
-        planes = sum(plane.buffer_size for plane in self._image.frame.planes)
-        return planes + (0 if self._whole is None else self._whole.nbytes)
+        """How many bytes the planes of the decoded image take, or the converted one."""
+        if isinstance(self._image, np.ndarray):
+            return self._image.nbytes
+        return sum(plane.buffer_size for plane in self._image.frame.planes)
 
     def whole(self) -> Image:
-        """Return the undistorted image (h, w, 3) sRGB; converted once."""
-        if self._whole is None:
-            self._whole = self._undistortion.undistort(rgb_from_decoded(self._image, self._facts))
-        return self._whole
+        """Return the undistorted image (h, w, 3) sRGB; converted once, the decoded one is then let go."""
+        image = self._image
+        if not isinstance(image, np.ndarray):
+            image = self._image = self._undistortion.undistort(rgb_from_decoded(image, self._facts))
+        return image
 
     def crop(self, box: PixelBox) -> Image:
         """Return the undistorted part in a box; fields, rotated images and rare formats go by way of the whole."""
-        is_upright = self._image.parity is None and not self._facts.rotation_deg
-        conversion = self._conversions.of(self._image.frame) if self._whole is None and is_upright else None
+        image = self._image
+        if isinstance(image, np.ndarray) or image.parity is not None or self._facts.rotation_deg:
+            return self._crop_whole(box)
+        conversion = self._conversions.of(image.frame)
         if conversion is None:
-            x0, y0, x1, y1 = box
-            return self.whole()[y0:y1, x0:x1]
-        return self._undistortion.undistort_part(box, lambda part: rgb_from_part(self._image.frame, conversion, part))
+            return self._crop_whole(box)
+        return self._undistortion.undistort_part(box, lambda part: rgb_from_part(image.frame, conversion, part))
+
+    def _crop_whole(self, box: PixelBox) -> Image:
+        x0, y0, x1, y1 = box
+        return self.whole()[y0:y1, x0:x1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -33,6 +33,7 @@ from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import swap_limbs
 from airborne.tracking.model_based.misplaced_limbs import (
     SAME_M,
+    LimbFaults,
     find_misplaced_limbs,
     limb_distance,
     search_limb,
@@ -69,7 +70,7 @@ class _MaskFaults:
     """A fit, and where its mask and the images do not go together."""
 
     fit: Fit
-    misplaced: Sequence[NDArray[np.int64]]  # limbs that cover pixels unlike the body
+    limbs: LimbFaults  # that cover pixels unlike the body
     beside: Sequence[NDArray[np.int64]]  # limbs beside which more than a rim stands uncovered, in two views
     n_views_uncovered: int  # in which something like a limb stands out that the body does not cover
 
@@ -140,7 +141,7 @@ class Fitter:
 
     def _assess(self, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
         fit = faults.fit
-        segments = tuple(int(segment) for limb in faults.misplaced for segment in limb)
+        segments = tuple(int(segment) for limb in faults.limbs.misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, fit.views, fit.equations.noise_of_views)
         for limb in faults.beside:  # it may be there: no better than one view
             n_views_of[limb] = np.minimum(n_views_of[limb], 1)
@@ -182,10 +183,10 @@ class Fitter:
             return faults, prior
 
         faults = self._find_faults(fit, learned)
-        if faults.misplaced or faults.beside or turned_pelvis.is_improbable(self.model, fit.pose):
+        if faults.limbs.suspect or faults.beside or turned_pelvis.is_improbable(self.model, fit.pose):
             refitted, prior = self._refit_body(fit, learned, prior)
             faults = faults if refitted is fit else self._find_faults(refitted, learned)
-            for limb in faults.misplaced:
+            for limb in faults.limbs.suspect:
                 faults, prior = search(limb, faults, prior)
             for limb in faults.beside:
                 faults, prior = search(limb, faults, prior)
@@ -277,11 +278,11 @@ class Fitter:
 
     def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
         model = self.render_model
-        misplaced = find_misplaced_limbs(model, fit.pose, *learned.views)
+        limbs = find_misplaced_limbs(model, fit.pose, *learned.views)
         pixels, beside_m2 = find_uncovered(model, model.with_pose(fit.pose), *learned.views)
         of_limb = ((limb, beside_m2[:, limb].sum(axis=1)) for limb in limbs_of(self.model))
         beside = [limb for limb, areas_m2 in of_limb if np.sum(areas_m2 > _BESIDE_M2) >= _FEWEST_VIEWS]
-        return _MaskFaults(fit, misplaced, beside, sum(bool(each.any()) for each in pixels))
+        return _MaskFaults(fit, limbs, beside, sum(bool(each.any()) for each in pixels))
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]

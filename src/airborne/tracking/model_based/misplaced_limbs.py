@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,25 +34,43 @@ SAME_M = 0.02  # fits from two places of a limb that are no further apart end in
 # searches 271 end, of which 3 moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up to 0.6 m
 _CLEARLY_LESS_NATS = 1.0
 _FEWEST_PX = 25  # a segment with fewer visible pixels in a view is occluded there, not misplaced
-_MISPLACED = 0.5  # share of the body's precision, below which a segment is misplaced
+_SUSPECT = 0.5  # share of the body's precision, below which a segment is suspect
+# share of a segment's pixels in a view that are surely not body, of a probability below 0.02, above which it is
+# misplaced. On six synthetic people, and the same in two views, 33 to 48 % of limbs 0.1 m off have such a segment, and
+# 3 to 5 % of right ones; a suspect one 30 to 39 %, but 8 to 10 % of right ones, before what looks like them
+_SURELY_OTHER, _MISPLACED = 0.02, 0.25
+
+
+class LimbFaults(NamedTuple):
+    """Limbs, as segment indices, that may be misplaced."""
+
+    suspect: list[NDArray[np.int64]]  # some segment covers pixels that are less like the body than the body's others
+    misplaced: list[NDArray[np.int64]]  # some segment covers pixels that are surely something else
 
 
 def find_misplaced_limbs(
     render_model: RenderModel, pose: Pose, regions: Sequence[Region], posteriors: Sequence[Array]
-) -> list[NDArray[np.int64]]:
-    """Return the limbs, as segment indices, of which some segment covers pixels unlike the body in some view."""
+) -> LimbFaults:
+    """Find the limbs of which some segment covers pixels unlike the body in some view."""
     n = len(render_model.model.segments)
-    posed, pixels, inside = render_model.with_pose(pose), np.zeros((len(regions), n)), np.zeros((len(regions), n))
+    posed, (pixels, inside, other) = render_model.with_pose(pose), np.zeros((3, len(regions), n))
     for row, (region, posterior) in enumerate(zip(regions, posteriors, strict=True)):
         part = render_model.draw_parts(posed, region)
         visible = part >= 0
-        owner = render_model.segment_of_part[part[visible]]
+        owner, probability = render_model.segment_of_part[part[visible]], posterior[visible]
         pixels[row] = np.bincount(owner, minlength=n)
-        inside[row] = np.bincount(owner, posterior[visible], minlength=n)
-    precision = inside.sum() / max(pixels.sum(), 1)
-    is_misplaced = np.any((pixels >= _FEWEST_PX) & (inside < _MISPLACED * precision * pixels), axis=0)
-    limb = limb_of_segment(render_model.model)
-    return [np.flatnonzero(limb == each) for each in np.unique(limb[is_misplaced & (limb >= 0)])]
+        inside[row] = np.bincount(owner, probability, minlength=n)
+        other[row] = np.bincount(owner, probability < _SURELY_OTHER, minlength=n)
+    precision, is_shown = inside.sum() / max(pixels.sum(), 1), pixels >= _FEWEST_PX
+    is_misplaced = is_shown & (other > _MISPLACED * pixels)
+    is_suspect = is_misplaced | is_shown & (inside < _SUSPECT * precision * pixels)
+    return LimbFaults(*(_limbs_with(render_model.model, each.any(axis=0)) for each in (is_suspect, is_misplaced)))
+
+
+def _limbs_with(model: BodyModel, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Return the limbs of which some segment is chosen (segments,)."""
+    limb = limb_of_segment(model)
+    return [np.flatnonzero(limb == each) for each in np.unique(limb[chosen & (limb >= 0)])]
 
 
 def search_limb(

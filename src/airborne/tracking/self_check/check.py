@@ -179,7 +179,9 @@ def gather_equations(
         wide = widen(wide, nuisance)
     solution, weights = solve(evidence, wide)
     errors = pose_errors(evidence, weights)
-    return RunEquations(rows, evidence, _with_fall(solution, errors, rig, path, rows), errors, prior)
+    if not model.has_joints:  # a person's centre of mass moves in the root; `find_wrong_fall` measures its fall
+        solution = _with_fall(solution, errors, rig, path, rows)
+    return RunEquations(rows, evidence, solution, errors, prior)
 
 
 def _gather(
