@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -45,6 +46,7 @@ def narrow_regions(
     return [_narrow(region, points, margin_px) for region in regions]
 
 
+@lru_cache(maxsize=2)  # frames are searched and then learned from
 def reduce_frames(frames: Frames, body: PosedBody, most_px_per_m: float) -> Frames:
     """Average the images over squares of pixels until none shows the body at more than `most_px_per_m`.
 
