@@ -64,13 +64,13 @@ def find_misplaced_limbs(
     precision, is_shown = inside.sum() / max(pixels.sum(), 1), pixels >= _FEWEST_PX
     is_misplaced = is_shown & (other > _MISPLACED * pixels)
     is_suspect = is_misplaced | is_shown & (inside < _SUSPECT * precision * pixels)
-    return LimbFaults(*(_limbs_with(render_model.model, each.any(axis=0)) for each in (is_suspect, is_misplaced)))
+    return LimbFaults(*(_limbs_with(render_model.model, each) for each in (is_suspect, is_misplaced)))
 
 
 def _limbs_with(model: BodyModel, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Return the limbs of which some segment is chosen (segments,)."""
-    limb = limb_of_segment(model)
-    return [np.flatnonzero(limb == each) for each in np.unique(limb[chosen & (limb >= 0)])]
+    """Return the limbs of which some segment is chosen in some view (views, segments)."""
+    limb, is_chosen = limb_of_segment(model), np.any(chosen, axis=0)
+    return [np.flatnonzero(limb == each) for each in np.unique(limb[is_chosen & (limb >= 0)])]
 
 
 def search_limb(
