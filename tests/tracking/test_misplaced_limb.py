@@ -16,6 +16,7 @@ from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.tracker import step
 from tests.support.people import HUMAN, mean_errors_mm, person, tracker
 from tests.support.scenes import statuses, track
 
@@ -143,3 +144,22 @@ def test_limb_that_was_expected_stays_where_one_colour_shows_no_better_place(fra
     folded = [fold(expected, name, turn) for name, turn in FOLDS.items()]
     judged = fitter.judge(fitter.fit_images([expected], learned, prior), folded, learned, prior)
     assert frame.off_mm(judged.fit.pose, np.arange(len(HUMAN.segments))) < 20
+
+
+@pytest.fixture(scope="module")
+def followed():
+    """A tracker, what it knows after two frames, and the third."""
+    followed = tracker(SCENE, SCENE.start())
+    state = followed.init()
+    for index in range(2):
+        state, _ = step(followed, state, SCENE.frames(index))
+    return followed, state, SCENE.frames(2)
+
+
+@pytest.mark.parametrize("name", [None, "upper_arm_left", "thigh_right"])
+def test_of_a_pose_found_otherwise_only_limbs_on_something_else_are_unknown(followed, name):
+    tracker_of_scene, state, frames = followed
+    pose = SCENE.start(2) if name is None else fold(SCENE.start(2), name, FOLDS[name])
+    covariance = tracker_of_scene.assess(state, frames, ((frames.time_s, pose),)).covariance
+    is_open = ~np.isfinite(np.diagonal(covariance)).reshape(-1, 3).all(axis=1)[1:]  # of each segment's rotation
+    np.testing.assert_array_equal(np.flatnonzero(is_open), [] if name is None else limb_with(name))

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import chain
+from itertools import chain, takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.texture import cut_patches, with_texture
 from airborne.tracking.predictors import PoseHistory
 from airborne.tracking.time_offsets import CompensatedState, CompensatedTracker
-from airborne.types import Progress
+from airborne.types import Array, Progress
 from airborne.video import Frames
 from airborne.video.rereading import Rereading
 
@@ -87,7 +87,8 @@ def fit_whole_run(
             poses = bridge_lost_limbs(model, poses, time_s, motion.covariance[rows], window.stretches)
         look = _Look(images, window, shown[rows])
         fit = fit_run(model, poses, time_s, window.stretches, look, n_steps=images.n_steps)
-        covariances = smooth_covariances(model, fit, time_s, window.stretches, motion.covariance[rows])
+        own = images.assess(fit.poses, window, motion)
+        covariances = smooth_covariances(model, fit, time_s, window.stretches, own)
         for row, pose, each in list(zip(rows, fit.poses, covariances, strict=True))[window.kept]:
             matrix = pose.world_from_root.as_matrix()
             position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
@@ -201,11 +202,29 @@ class _RunImages:
             self.surfaces.append(surface)
         return _tracked_evidence(tracked, path[-1][1], found) if frames.index in self.keys else found
 
+    def assess(self, poses: Sequence[Pose], window: _Window, motion: Motion) -> Array:
+        """Return the covariances of a window's frames by themselves (n, d, d), where limbs were unknown at its poses.
+
+        What neither was sure of, two directions or a key, stays as it is.
+        """
+        covariances, rows = motion.covariance[window.rows], window.rows
+        is_open = ~np.isfinite(np.diagonal(covariances, axis1=1, axis2=2)).all(axis=1)
+        is_open &= ~motion.uncertain_joints[rows].any(axis=1) & ~np.isin(motion.index[rows], list(self.keys))
+        chosen: list[int] = np.flatnonzero(is_open).tolist()
+        path = [(Fraction(time_s), pose) for time_s, pose in zip(motion.time_s[rows], poses, strict=True)]
+        estimates = [self.estimates[window.first + i] for i in chosen]
+        for i, frames in zip(chosen, self.frames(estimates) if estimates else (), strict=True):
+            past = (*path[:i], (frames.time_s, poses[i]))
+            found = self.tracker.assess(self.learned, frames, past).covariance
+            if found is not None:
+                covariances[i] = _with_known(covariances[i], found)
+        return covariances
+
     def frames(self, estimates: Sequence[Estimate]) -> Iterator[Frames]:
         """Yield the frames of estimates; as many as may be held are decoded once, until later ones are asked for."""
         wanted = [estimate.index for estimate in estimates]
         self._held = {index: frames for index, frames in self._held.items() if index >= wanted[0]}
-        held = [self._held[index] for index in wanted if index in self._held]
+        held = [self._held[index] for index in takewhile(self._held.__contains__, wanted)]
         for frames in chain(held, self._read(wanted[len(held) :])):
             yield frames
             self._n_read += 1
@@ -253,6 +272,14 @@ class _Look:
         self.misfits = [each.misfit for each in evidence]
         images.learn_texture(evidence)
         return evidence
+
+
+def _with_known(covariance: Array, found: Array) -> Array:
+    """Return a covariance (d, d) with what another one knows where its own variances are infinite."""
+    is_new = ~np.isfinite(np.diagonal(covariance)) & np.isfinite(np.diagonal(found))
+    joined = np.where(is_new | is_new[:, None], 0.0, covariance)
+    joined[np.ix_(is_new, is_new)] = found[np.ix_(is_new, is_new)]
+    return joined
 
 
 def _tracked_evidence(estimate: Estimate, pose: Pose, images: ImageEvidence) -> ImageEvidence:

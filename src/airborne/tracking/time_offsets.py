@@ -82,6 +82,10 @@ class CompensatedTracker:
         """Reduce the images of a body whose joints move, as they are looked at."""
         return self._tracker.reduce_frames(frames)
 
+    def assess(self, state: CompensatedState, frames: Frames, past: PoseHistory) -> Estimate:
+        """Return what the images say of the newest of the poses in `past`, which those of other times confirm."""
+        return self._tracker.assess(state.inner, compensate_offsets(frames, past[-_HISTORY:]), past[-1][1])
+
     def linearise(
         self,
         state: CompensatedState,

@@ -27,6 +27,7 @@ from airborne.tracking.model_based.gauss_newton import (
     fit_images,
     fit_silhouettes,
     image_evaluator,
+    linearise_fit,
 )
 from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.learned_regions import LearnedRegions
@@ -137,11 +138,19 @@ class Fitter:
         """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        return self._assess(self._refit_limbs(fit, guesses, learned, prior), learned)
+        faults = self._refit_limbs(fit, guesses, learned, prior)
+        return self._assess(faults, faults.limbs.suspect, learned)
 
-    def _assess(self, faults: _MaskFaults, learned: LearnedRegions) -> JudgedFit:
-        fit = faults.fit
-        segments = tuple(int(segment) for limb in faults.limbs.misplaced for segment in limb)
+    def judge_pose(self, pose: Pose, learned: LearnedRegions) -> JudgedFit:
+        """Judge a pose with joints that frames before and after confirm: only limbs that are surely misplaced are."""
+        fit = linearise_fit(self.render_model, pose, self._views([pose], learned), dofs=self.stages[-1])
+        faults = self._find_faults(fit, learned)
+        return self._assess(faults, faults.limbs.misplaced, learned)
+
+    def _assess(
+        self, faults: _MaskFaults, misplaced: Sequence[NDArray[np.int64]], learned: LearnedRegions
+    ) -> JudgedFit:
+        fit, segments = faults.fit, tuple(int(segment) for limb in misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, fit.views, fit.equations.noise_of_views)
         for limb in faults.beside:  # it may be there: no better than one view
             n_views_of[limb] = np.minimum(n_views_of[limb], 1)

@@ -162,6 +162,13 @@ def fit_images(
     return Fit(pose, dofs, best, (best.noise / correlated) ** 0.5, views, prior)
 
 
+def linearise_fit(render_model: RenderModel, pose: Pose, views: Sequence[ImageView], *, dofs: DegreesOfFreedom) -> Fit:
+    """Return the fit that ends where it begins, without anything expected."""
+    evaluate, correlated = image_evaluator(render_model, [pose], views, dofs=dofs)
+    equations = evaluate(pose, True)
+    return Fit(pose, dofs, equations, (equations.noise / correlated) ** 0.5, views, None)
+
+
 def linearise_images(
     render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance, *, dofs: DegreesOfFreedom
 ) -> PoseEquations:

@@ -154,6 +154,13 @@ class RefinedTracker:
         learned = regions_near(self._fitter, poses, frames, state.appearance)
         return self._fitter.weigh(poses, learned) if learned.masks.regions else np.zeros(len(poses))
 
+    def assess(self, state: RefinedState, frames: Frames, pose: Pose) -> Estimate:
+        """Return what the images of a time say of a pose that those of other times confirm."""
+        frames = self.reduce_frames(frames)
+        learned = regions_near(self._fitter, [pose], frames, state.appearance)
+        judged = self._fitter.judge_pose(pose, learned) if learned.masks.regions else None
+        return self._estimate(frames, judged, state.reference)
+
     def linearise(
         self,
         state: RefinedState,
