@@ -125,14 +125,23 @@ def test_a_frame_with_a_key_stays_where_it_was_put(run):
     assert np.linalg.norm(free.motion.position[6] - tracked.position[6]) > 0.03
 
 
-def test_what_no_image_shows_stays_unknown_and_a_run_too_short_as_it_is(run):
+@pytest.mark.parametrize(("uncertain", "is_known"), [((), True), ((1,), False)])
+def test_a_joint_that_a_frame_did_not_know_is_known_where_its_images_show_it_unless_it_may_be_elsewhere(
+    run, uncertain, is_known
+):
     covariance = np.diag(run.sd**2)
     covariance[9:12], covariance[:, 9:12] = 0.0, 0.0
     covariance[range(9, 12), range(9, 12)] = np.inf
-    estimates = [*run.estimates[:6], replace(run.estimates[6], covariance=covariance), *run.estimates[7:]]
-    fitted = run.fit(estimates)[1]
-    assert np.isinf(np.diagonal(fitted.motion.covariance[6])[9:12]).all()
-    assert np.isfinite(np.delete(np.diagonal(fitted.motion.covariance, axis1=1, axis2=2), 6, axis=0)).all()
+    unknown = replace(run.estimates[6], covariance=covariance, uncertain_joints=uncertain)
+    variances = np.diagonal(
+        run.fit([*run.estimates[:6], unknown, *run.estimates[7:]])[1].motion.covariance, axis1=1, axis2=2
+    )
+    assert (np.isfinite(variances[6, 9:12]) == is_known).all()
+    assert np.isfinite(np.delete(variances, range(9, 12), axis=1)).all()
+    assert np.isfinite(np.delete(variances, 6, axis=0)).all()
+
+
+def test_a_run_too_short_to_be_smooth_stays_as_it_is(run):
     assert run.fit(run.estimates[:4])[1] is None
 
 
