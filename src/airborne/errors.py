@@ -62,6 +62,10 @@ class ResultError(AirborneError):
     """A run folder or truth file is unusable."""
 
 
+class RunThereError(ResultError):
+    """A folder already holds a run, and nothing was said of going on with it or replacing it."""
+
+
 def count(n: int, noun: str) -> str:
     """Return a number with its noun, as 1 camera or 2 cameras."""
     return f"{n} {noun if n == 1 else f'{noun}s'}"

@@ -252,8 +252,8 @@ def _check_same_videos(folder: Path, repeats: Sequence[Path]) -> None:
         if videos and others and not set(videos) & set(others):
             names = ", ".join([*others.values()][:3])
             raise ResultError(
-                f"{other} is a run of other videos ({names}) than {folder}; give a run of the same trial as --repeat; "
-                "a run of other cameras is compared by its joints.csv as --joints"
+                f"{other} is a run of other videos ({names}) than {folder}; give a run of the same trial; a run of "
+                "other cameras is compared by its joints.csv, as paths of joints"
             )
 
 
