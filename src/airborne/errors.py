@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 UNDECIDED, STOPPED = 3, 130  # exit codes of the command line beside 2: of an UndecidedError, of Ctrl-C
 _LONGEST = 1200  # characters of a message
 _OTHER_WORDS = {"end": ("stop",), "last": ("stop",), "first": ("frame",), "step": ("every",), "path": ("file", "video")}
-_MOST_SAID = 5  # mistakes of one file in a line
+MOST_SAID = 5  # mistakes of one file in a line
 
 
 class AirborneError(Exception):
@@ -51,15 +51,24 @@ class UndecidedError(TrialError):
 class MistakesError(TrialError):
     """A trial file with mistakes: the message says the first and counts the others, `mistakes` has a line for each."""
 
-    def __init__(self, where: str, mistakes: Sequence[str], places: Sequence[tuple[int | str, ...]] = ()) -> None:
-        """Take where they are, a file or options of the command line, and what each is; their places in its tables."""
+    def __init__(
+        self, where: str, mistakes: Sequence[str], places: Sequence[tuple[int | str, ...]] = (), most_said: int = 1
+    ) -> None:
+        """Take where they are, a file or options of the command line, and what each is; their places in its tables.
+
+        The message says the first `most_said`.
+        """
         self.plain, self.places = tuple(mistakes), tuple(places)
         self.mistakes = tuple(f"{where}: {mistake}" for mistake in mistakes)
-        super().__init__(f"{where}: {_count_others(mistakes)}")
+        super().__init__(f"{where}: {_count_others(mistakes, most_said)}")
 
 
 class ResultError(AirborneError):
     """A run folder or truth file is unusable."""
+
+
+class RunThereError(ResultError):
+    """A folder already holds a run, and nothing was said of going on with it or replacing it."""
 
 
 def count(n: int, noun: str) -> str:
@@ -101,7 +110,7 @@ _KIND = re.compile(r"(literal|dict|list|constrained|function)\W.*|str|int|float|
 def one_line(error: ValidationError, document: Any, model: type[BaseModel]) -> str:
     """Say a pydantic error's complaints in one line: where, what, what was given; see `list_mistakes`."""
     mistakes = list_mistakes(error, (), document, model)
-    return _count_others(["; ".join(mistakes[:_MOST_SAID]), *mistakes[_MOST_SAID:]])
+    return _count_others(mistakes, MOST_SAID)
 
 
 def list_mistakes(error: ValidationError, tags: Collection[str], document: Any, model: type[BaseModel]) -> list[str]:
@@ -156,6 +165,8 @@ def _describe_place(place: tuple[str, ...], errors: Sequence[ErrorDetails], mode
         alike = get_close_matches(place[-1], keys, 1) or [key for key in _OTHER_WORDS.get(place[-1], ()) if key in keys]
         if alike:
             return f"{where}: unknown key; did you mean {alike[0]}?"
+    if first["type"] == "list_type" and isinstance(first["input"], dict):
+        return f"{where}: found one table, expected a list of tables; write [{{...}}], in a file the head [[{where}]]"
     said = ", or ".join(dict.fromkeys(map(_phrase, errors)))
     given = "" if isinstance(first["input"], dict) else f" (found {_quote(first['input'])})"
     return f"{where}{': ' if where else ''}{said}{given}"
@@ -180,9 +191,9 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     return [model for each in get_args(annotation) for model in _models_in(each)]
 
 
-def _count_others(mistakes: Sequence[str]) -> str:
-    more = len(mistakes) - 1
-    return mistakes[0] + (f"; and {count(more, 'more mistake')}" if more else "")
+def _count_others(mistakes: Sequence[str], most_said: int) -> str:
+    more = len(mistakes) - most_said
+    return "; ".join(mistakes[:most_said]) + (f"; and {count(more, 'more mistake')}" if more > 0 else "")
 
 
 def _phrase(one: ErrorDetails) -> str:

@@ -174,6 +174,14 @@ def test_a_dry_run_names_a_video_that_is_missing(season, tmp_path, capsys):
     assert re.match(r"good: cannot be tracked: .*cam2\.mp4", capsys.readouterr().out)
 
 
+def test_a_dry_run_names_a_body_that_cannot_be_used(season, tmp_path, capsys):
+    shutil.copytree(season / "good", tmp_path / "trials" / "good")
+    body = tmp_path / "trials" / "good" / "cross.toml"
+    body.write_text(re.sub(r"size_m = \[[^,]*", "size_m = [600.0", body.read_text(), count=1))
+    assert in_process("batch", tmp_path / "trials", "-o", tmp_path / "out", "--dry-run") == 1
+    assert re.match(r"good: cannot be tracked: .*is it in millimetres", capsys.readouterr().out)
+
+
 @pytest.mark.usefixtures("impatient")
 def test_a_batch_that_cannot_start_exits_with_2(tmp_path, season, capsys):
     assert in_process("batch", tmp_path / "nothing", "-o", tmp_path / "out") == 2

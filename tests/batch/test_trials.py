@@ -54,6 +54,8 @@ def test_a_tables_columns_are_labels_over_those_of_the_file(tmp_path):
     ("table", "said"),
     [
         ("name,condition\nx,wet\n", "one of them trial"),
+        ("", r"trials\.csv is empty; a table of trials has"),
+        ("Trial,condition\nx,wet\n", "columns Trial, condition; .* write trial instead of 'Trial'"),
         ("trial,condition\nx\n", "row 2: 1 cells, expected 2"),
         ("trial\nx\na/x\n", "two trials are called x"),
         ("trial\n", "no trial is there"),

@@ -296,3 +296,14 @@ def test_less_sure_detections_are_not_seen():
 def test_an_empty_folder_holds_no_detections(tmp_path):
     with pytest.raises(CalibrationError, match="holds no detections"):
         read_detections(tmp_path, ())
+
+
+def test_detections_in_shares_of_the_image_are_refused_and_a_still_point_is_not(tmp_path):
+    shares = table() * [1 / 700, 1 / 700, 1] - [0.1, 0, 0]
+    with pytest.raises(
+        CalibrationError, match=r"coordinates lie within -0\.\d\d to .* multiply x by the image's width"
+    ):
+        read_detections(save(tmp_path, left=shares), ["left"])
+    one = table(frames=1)
+    one[0, 1:, 2] = 0
+    assert read_detections(save(tmp_path, left=one), ["left"]).visibility.sum() == one[0, 0, 2]

@@ -236,6 +236,23 @@ def test_the_first_frame_says_what_to_open_also_where_it_failed(trial, tmp_path,
     assert f"results: {tmp_path / 'run'}; open {tmp_path / 'run' / drawn[0]}, " in out
 
 
+def test_a_demo_that_is_stopped_goes_on_by_the_same_command(short_run, tmp_path, capsys, monkeypatch):
+    folder, given = shutil.copytree(short_run, tmp_path / "demo"), []
+
+    def interrupted(*arguments, **options):
+        given.append((options["resume"], options["overwrite"]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("airborne.run.track.track_trial", interrupted)
+    monkeypatch.setattr("airborne.run.folder.holds_run_of", lambda trial, folder: True)
+    for name in ("report.html", "summary.json"):
+        assert in_process("demo", "-o", folder) == 130
+        assert capsys.readouterr().err.endswith(f"kept in {folder}; the same command goes on\n")
+        (folder / name).unlink(missing_ok=True)
+    assert in_process("demo", "-o", folder) == 130
+    assert given == [(False, True), (False, True), (True, False)]
+
+
 def test_a_stop_before_the_first_frame_leaves_nothing(trial, tmp_path, capsys, monkeypatch):
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt

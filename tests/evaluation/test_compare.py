@@ -174,10 +174,54 @@ def test_of_rotations_that_are_transposed_it_is_asked():
 def test_a_reference_in_millimetres_is_asked_about_in_columns_that_stay_apart():
     true = flight()
     text = compare_motion(motion_of(true), replace(true, position=1e3 * true.position), IDENTITY).describe()
-    assert "is it in millimetres?" in text
+    assert "are its numbers millimetres that are read as metres?" in text
     row = next(line for line in text.splitlines() if line.startswith("  in space"))
     assert len(row.split()) == 4
     assert "millimetres" not in compare_motion(motion_of(true), true, IDENTITY).describe()
+
+
+def test_a_far_reference_that_dividing_does_not_explain_is_asked_about_too():
+    true = flight()
+    text = compare_motion(motion_of(true), replace(true, position=1e3 * true.position + 1e3), IDENTITY).describe()
+    assert "is it in millimetres?" in text
+
+
+def test_a_reference_with_exchanged_axes_is_asked_about_and_nothing_else():
+    true = flight()
+    known = motion_of(true, covariance=np.diag(np.full(6, 1e-6)))
+    other = replace(true, position=true.position[:, [1, 0, 2]], R=true.R[:, [1, 0, 2]] * [1, 1, -1])
+    text = compare_motion(known, other, IDENTITY).describe()
+    assert "with its y, x, z taken as x, y, z the reference would lie 0 mm from the run" in text
+    assert text.count("?") == 1 and "TRC" not in text
+
+
+@pytest.mark.parametrize("first_s", [0.0, 0.2])
+def test_a_reference_whose_times_are_twice_as_long_is_asked_about_its_rate(first_s):
+    true = flight()
+    known = replace(motion_of(true, covariance=np.diag(np.full(6, 1e-6))), time_s=true.time_s + first_s)
+    text = compare_motion(known, replace(true, time_s=first_s + 2 * true.time_s), IDENTITY).describe()
+    assert "with its times multiplied by 0.5 " in text and "is its rate 50 times a second, not 25?" in text
+    assert text.count("?") == 1
+
+
+def test_a_reference_of_which_few_times_match_is_asked_about_them():
+    true = flight()
+    other = replace(true, time_s=1.13 * true.time_s, position=true.position[::-1])
+    text = compare_motion(motion_of(true), other, IDENTITY).describe()
+    assert "times match that could: its times are 22.6 ms apart, the run's 20 ms" in text and text.count("?") == 1
+
+
+def test_of_another_recording_no_rotation_is_called_transposed():
+    true = flight()
+    known = motion_of(true, covariance=np.diag(np.full(6, 1e-6)))
+    text = compare_motion(known, replace(true, R=true.R[::-1], position=true.position[::-1]), IDENTITY).describe()
+    assert "transposed" not in text and "hardly any rotation lies within 2 sd: is this the reference of this" in text
+
+
+@pytest.mark.parametrize("error_m", [0.0, 0.005, [0.5, 0, 0.2]])
+def test_of_a_right_reference_nothing_is_asked_however_far_the_run_is(error_m):
+    text = compare_motion(shifted(motion_of(flight()), error_m), flight(), IDENTITY).describe()
+    assert "?" not in text
 
 
 def test_a_truth_whose_clock_is_off_by_a_frame_is_reported():

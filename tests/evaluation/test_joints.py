@@ -126,6 +126,31 @@ def test_a_reference_whose_clock_is_off_by_a_frame_is_reported():
     assert "-16.7 ms" in result.describe()
 
 
+@pytest.mark.parametrize(
+    ("change", "question"),
+    [
+        (lambda p: replace(p, points=p.points / 1000), "metres that are read as millimetres?"),
+        (lambda p: replace(p, points=p.points * 1000), "millimetres that are read as metres?"),
+        (lambda p: replace(p, points=p.points * 100), "centimetres that are read as metres?"),
+        (lambda p: replace(p, points=p.points[..., [2, 0, 1]]), "with its y, z, x taken as x, y, z the reference"),
+        (lambda p: replace(p, points=p.points * [-1, -1, 1]), "with its -x, -y, z taken as x, y, z the reference"),
+        (lambda p: replace(p, time_s=2 * p.time_s), "is its rate 60 times a second, not 30?"),
+    ],
+)
+def test_a_reference_that_is_mixed_up_is_asked_about_and_no_clock(change, question):
+    text = compare_joints(run(), MODEL, change(paths())).describe()
+    assert question in text and text.count("?") == 1 and "both clocks" not in text
+
+
+def test_left_and_right_of_a_reference_that_are_exchanged_are_asked_about():
+    marks = ("pelvis", "head", "knee_left", "knee_right", "knee")
+    model = replace(MODEL, landmarks=tuple(replace(m, name=n) for m, n in zip(MODEL.landmarks, marks, strict=True)))
+    exchanged = ("pelvis", "head", "knee_right", "knee_left", "knee")
+    text = compare_joints(run(), model, paths(names=exchanged)).describe()
+    assert "with its left and right exchanged the reference would lie 0 mm" in text and text.count("?") == 1
+    assert "?" not in compare_joints(run(), model, paths(names=marks)).describe()
+
+
 def test_a_reference_with_times_in_milliseconds_is_asked_about():
     with pytest.raises(ResultError, match="are they in milliseconds"):
         compare_joints(run(), MODEL, replace(paths(), time_s=1e3 * paths().time_s))

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def test_text_of_the_user_is_escaped_wherever_it_stands(tmp_path):
 
 def test_headline_numbers_stand_on_the_page(tmp_path):
     html = html_of(tmp_path, run(21, uncertain=(3,), lost=(20,)))
-    for words in ("21 frames: 19 tracked, 1 uncertain, 1 lost", "± 2 mm", "± 0.57°", "0.95 ± 0.00 turns", "0.4 s"):
+    for words in ("21 frames: 19 tracked, 1 uncertain, 1 lost", "± 2 mm", "± 0.57°", "0.9500 ± 0.0023 turns", "0.4 s"):
         assert words in html
 
 
@@ -97,7 +98,7 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
         "<dt>Joint angles</dt>",
         "a free fall [mm]",
         "mean over the frames, standard deviation of its error",
-        "its scatter from frame to frame about x",
+        "its standard deviation over the frames about x",
     )
     assert [word for word in words if word not in html] == []
     assert html.count("<img") == 5
@@ -106,11 +107,11 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
     assert [word for word in words if word in html_of(tmp_path / "rigid", run())] == []
 
 
-def test_unknown_numbers_of_a_flight_are_shown_as_not_known(tmp_path):
-    motion = person_run(2)
-    write_figures(figures_of(tmp_path), motion, PERSON)
-    html = html_of(tmp_path, motion, flight=flight_summary(motion, measure_flight(motion, PERSON)).to_dict())
-    assert "fitted, free fall</th><td>not known</td><td>9.81</td>" in html
+def test_of_too_few_poses_or_a_body_that_does_not_fall_no_free_fall_is_shown(tmp_path):
+    for motion in (person_run(2), replace(run := person_run(60), position=np.tile(run.position[:1], (60, 1)))):
+        write_figures(figures_of(tmp_path), motion, PERSON)
+        html = html_of(tmp_path, motion, flight=flight_summary(motion, measure_flight(motion, PERSON)).to_dict())
+        assert "<th>free fall</th><td>none found</td>" in html and "downward acceleration" not in html
 
 
 def test_a_comparison_with_paths_of_joints_becomes_a_table(tmp_path):
@@ -158,3 +159,18 @@ def test_the_method_shows_only_the_settings_that_it_used():
     assert {"prediction", "every"} <= set(shown)
     assert not {page.label("steps_mm"), "colour"} & set(shown)
     assert page.label("steps_mm") in dict(page.settings_table({**record, "method": "stepping"}).rows)
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "text"),
+    [
+        (0.54, 0.0025, "0.5400 ± 0.0025"),
+        (-0.18, 0.0099, "−0.1800 ± 0.0099"),
+        (12.3, 14.2, "12 ± 14"),
+        (1.25, None, "1.25"),
+        (1.25, 0.0, "1.25"),
+        (None, None, "not known"),
+    ],
+)
+def test_a_number_has_the_digits_of_its_standard_deviation(value, sd, text):
+    assert page.format_with_sd(value, sd) == text

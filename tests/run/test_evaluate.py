@@ -194,6 +194,17 @@ def test_runs_of_one_trial_are_compared_with_one_another(run, tmp_path):
         evaluate_agreement(run, repeats=[tmp_path])
 
 
+def test_a_run_of_other_videos_is_no_repetition(run, tmp_path):
+    other = shutil.copytree(run, tmp_path / "other")
+    for folder, digests in ((run, "ab"), (other, "bc")):
+        inputs = {f"cam{k}.mp4": each for k, each in enumerate(digests)} | {"body.toml": "same"}
+        (folder / "run.json").write_text(json.dumps({"inputs": inputs}))
+    assert evaluate_agreement(run, repeats=[other], out=tmp_path).repeats["runs"]
+    (other / "run.json").write_text(json.dumps({"inputs": {"cam0.mp4": "d", "body.toml": "same"}}))
+    with pytest.raises(ResultError, match=r"other is a run of other videos \(cam0\.mp4\) than "):
+        evaluate_agreement(run, repeats=[other])
+
+
 def test_nothing_is_compared_with_itself(run, thrown_cross, tmp_path):
     other, clicks = shutil.copytree(run, tmp_path / "other"), thrown_cross / "digitised.csv"
     for repeats in ([run], [other, tmp_path / "run" / ".." / "other"]):

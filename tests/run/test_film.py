@@ -1,6 +1,8 @@
 """A film of a stretch: as many pictures as frames, the cameras side by side over the curves."""
 
+import shutil
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from PIL import Image as GifPicture
 
 from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import ResultError
-from airborne.run.film import write_film
+from airborne.run.film import _open, write_film
 from airborne.video import VideoSource, VideoWriter, inspect
 from airborne.video.seeking import ImageReader, index_images
 from tests.run.test_find import cli
@@ -71,6 +73,20 @@ def test_a_gif_leaves_pictures_out_that_browsers_would_slow_down(run, tmp_path):
 def test_what_cannot_be_filmed_is_one_line(run, tmp_path, name, frames, said):
     with pytest.raises(ResultError, match=said):
         write_film(run, tmp_path / name, **frames)
+
+
+@pytest.mark.parametrize(
+    ("is_finished", "said"),
+    [(True, r"do not hold the run's 12 frames; track again"), (False, "run is not finished; finish it with")],
+)
+def test_pictures_of_fewer_frames_are_named_with_what_to_do(run, tmp_path, monkeypatch, is_finished, said):
+    folder = shutil.copytree(run, tmp_path / "run")
+    if is_finished:
+        (folder / "summary.json").write_text("{}")
+    monkeypatch.setattr("airborne.run.film.index_images", lambda source: range(N - 1))
+    monkeypatch.setattr("airborne.run.film.ImageReader", lambda source, index: SimpleNamespace(index=index))
+    with pytest.raises(ResultError, match=said):
+        _open(folder, N)
 
 
 def test_a_run_without_pictures_says_so(run, tmp_path):

@@ -312,6 +312,14 @@ def test_camera_that_disagrees_is_named_with_the_remedy_and_left_alone(trial, tm
     assert resect_moved_cameras(trial(DETECTIONS, tables=detections()), RIG) == (RIG, ())
 
 
+def test_exchanged_detections_are_named_before_any_camera(trial):
+    large = Rig(tuple(replace(each, K=each.K * [[10], [10], [1]], size=(960, 720)) for each in RIG))
+    tables = detections(large)
+    tables["cam1"], tables["cam2"] = tables["cam2"], tables["cam1"]
+    with pytest.raises(MistakesError, match=r"the detections: they lie \d+ px .* cam1 and cam2 are exchanged"):
+        resect_moved_cameras(trial(DETECTIONS, tables=tables), large)
+
+
 def test_another_start_is_another_run(trial):
     one = input_hashes(trial(DETECTIONS, tables=detections()))
     other = input_hashes(trial(DETECTIONS, tables=detections(sd_px=1.0)))

@@ -130,6 +130,7 @@ def test_a_trial_that_lacks_an_event_is_left_out_and_named(results):
         (["--variable", "turned_deg", "--events", "take-off"], "give two or more"),
         (["--variable", "turned_deg", "--events", "start,finish"], "event 'finish' is not known"),
         (["--variable", "turned_deg", "--conditions", "dry"], "give two or more to compare"),
+        (["--variable", "turned_deg", "--conditions", "hot,icy"], "no trial of condition hot or icy; it has: .*dry"),
         (["--variable", "turned_deg", "--conditions", "dry,icy"], "no finished trial of condition icy"),
     ],
 )
@@ -174,7 +175,9 @@ def test_failed_trials_are_named_in_the_text(tmp_path):
     rows = [{"trial": f"{k}", "athlete": f"a{k % 4}", "condition": "xy"[k // 4], "rise_m": 0.1 * k} for k in range(8)]
     rows.append({"trial": "lost", "status": "failed", "error": "no video", "condition": "x", "rise_m": ""})
     text = write_comparison(write_results(tmp_path / "in", rows), tmp_path / "out", ["rise_m"])
-    assert "lost: failed: no video" in text
+    assert "\nLeft out\nlost: failed: no video\n" in text
+    sound = write_comparison(write_results(tmp_path / "sound", rows[:-1]), tmp_path / "out", ["rise_m"])
+    assert "\nLeft out\nnothing\n" in sound
 
 
 def test_a_folder_without_a_batch_is_one_line(tmp_path):

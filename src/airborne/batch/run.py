@@ -13,8 +13,8 @@ from airborne.batch.task import LOGS, THUMBNAILS, Task, TaskOutcome, inspect_fol
 from airborne.batch.trials import TABLE, BatchTrial
 from airborne.errors import AirborneError, ResultError
 from airborne.io.folder_lock import sole_writer
+from airborne.run.opening import open_trial
 from airborne.trial.file import read_trial
-from airborne.video import VideoSource, inspect
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +102,9 @@ def describe_plan(tasks: Sequence[Task]) -> tuple[list[str], bool]:
             trial = read_trial(task.trial.path)
             status = inspect_folder(task, trial)[0]
             if status != "unchanged":
-                for camera in trial.camera:
-                    inspect(VideoSource(camera.name, trial.path(camera.video)))  # raises where it cannot be opened
+                open_trial(trial)  # raises where a file cannot be used
+                if not trial.has_players:
+                    trial.model()
             lines.append(f"{task.trial.name}: {words[status]}")
         except AirborneError as error:
             lines.append(f"{task.trial.name}: cannot be tracked: {error}")

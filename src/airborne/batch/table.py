@@ -12,7 +12,7 @@ from urllib.parse import quote
 from airborne.batch.task import LOGS, TaskOutcome, thumbnail_of
 from airborne.batch.trials import TABLE, BatchTrial, label_names
 from airborne.errors import count
-from airborne.export.page import label, render_page
+from airborne.export.page import format_value, format_with_sd, label, render_page
 from airborne.io import parquet
 from airborne.io.writing import write_text
 from airborne.motion.run_folder import REPORT
@@ -66,11 +66,13 @@ def _page(folder: Path, rows: Sequence[Mapping[str, Any]], labels: Sequence[str]
         title=", ".join(
             [count(len(rows), "trial"), *(f"{n} {status}" for status, n in counts.items() if n and status != "done")]
         ),
-        headers=[label(name) for name in ("trial", *labels, "status", *shown)],
+        headers=[label(name.removeprefix("n_")) for name in ("trial", *labels, "status", *shown)],
         rows=[
             {
                 "name": row["trial"],
-                "cells": [row.get(name) for name in (*labels, "status", *shown)],
+                "cells": [
+                    (value, _text(row, name)) for name in (*labels, "status", *shown) for value in [row.get(name)]
+                ],
                 "report": _link(folder, folder / row["folder"] / REPORT),
                 "status": row["status"],
                 "log": _link(folder, folder / LOGS / f"{row['trial']}.log"),
@@ -80,6 +82,14 @@ def _page(folder: Path, rows: Sequence[Mapping[str, Any]], labels: Sequence[str]
             for row in ordered
         ],
     )
+
+
+def _text(row: Mapping[str, Any], name: str) -> str:
+    """Return a cell's text, numbers of turns with their standard deviation; empty where there is none."""
+    value = row.get(name)
+    if value is None:
+        return ""
+    return format_with_sd(value, row.get(f"{name}_sd")) if name.endswith("_rev") else format_value(value)
 
 
 def _link(folder: Path, path: Path) -> str | None:

@@ -85,7 +85,11 @@ def _read_rows(path: Path) -> list[tuple[Path, dict[str, str]]]:
     """Return the trial files of a table, relative to it, and their labels: its other columns."""
     (_, names), *rows = read_csv(path, _TABLE_FORM, TrialError) or [(1, [""])]
     if "trial" not in names or len(set(names)) < len(names):
-        raise TrialError(f"{path}: columns {', '.join(names)[:200]}; {_TABLE_FORM}")
+        if not any(names):
+            raise TrialError(f"{path} is empty; {_TABLE_FORM}")
+        meant = [name for name in names if name.strip().lower() == "trial"]
+        mend = f"; write trial instead of {meant[0]!r}" if len(meant) == 1 and "trial" not in names else ""
+        raise TrialError(f"{path}: columns {', '.join(names)[:200]}; {_TABLE_FORM}{mend}")
     found = []
     for line, cells in rows:
         if len(cells) != len(names):

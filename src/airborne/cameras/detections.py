@@ -20,6 +20,7 @@ from airborne.io.npz import read_arrays, write_arrays
 from airborne.types import Array
 
 _SKELETON = "skeleton"  # the array of a .npz that names its skeleton
+_OF_SHARES = (-0.5, 1.5)  # chosen: where shares of an image lie, of points a little outside of it too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -193,9 +194,22 @@ def _detections(
     for column, table in enumerate(tables.values()):
         values[: len(table), :, column] = table[:, : len(names)]
     is_seen = np.isfinite(values).all(axis=-1) & (values[..., 2] > 0)
+    _refuse_shares(where, values[..., :2][is_seen])
     values = np.where(is_seen[..., None], values, np.nan)
     visibility = np.clip(np.where(is_seen, values[..., 2], 0.0), 0.0, 1.0)
     return Detections(cameras=tuple(tables), points=names, px=values[..., :2], visibility=visibility, notes=notes)
+
+
+def _refuse_shares(where: str, px: Array) -> None:
+    """Raise CalibrationError where seen points (n, 2) are shares of an image."""
+    if not len(px) or px.max() == px.min():
+        return
+    least, most = _OF_SHARES
+    if least <= px.min() and px.max() <= most:
+        raise CalibrationError(
+            f"{where}: all coordinates lie within {px.min():.2f} to {px.max():.2f}, as shares of the image do; "
+            "expected pixels: multiply x by the image's width and y by its height"
+        )
 
 
 def landmarks_from_points(names: Sequence[str], points: Array) -> dict[str, Array]:

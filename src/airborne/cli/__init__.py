@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import errno
 import signal
 import sys
 from functools import cache
-from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -28,7 +26,7 @@ from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
 from airborne.errors import STOPPED, UNDECIDED, AirborneError, UndecidedError
 from airborne.io.environment import set_up_libraries
-from airborne.io.writing import missing_folder
+from airborne.io.writing import describe_path_error
 
 _UsageError: Any = typer.BadParameter.__bases__[0]  # wherever this version of typer keeps it
 _STEPS = {  # in the order of the work
@@ -115,7 +113,7 @@ def main() -> None:
     except AirborneError as error:
         refuse(str(error))
     except OSError as error:
-        refuse(_describe_path_error(error))
+        refuse(describe_path_error(error, "give another folder with -o"))
 
 
 def _refuse_usage(error: Any) -> NoReturn:
@@ -131,24 +129,6 @@ def _refuse_usage(error: Any) -> NoReturn:
         message = f"{message.rstrip('.')}: {meaning}"
     text, command = " ".join(message.split()).rstrip("."), context.command_path if context else "airborne"
     refuse(f"{text} See {command} --help" if text.endswith("?") else f"{text}; see {command} --help")
-
-
-def _describe_path_error(error: OSError) -> str:
-    """Describe what is wrong with the path of a file error."""
-    path = Path(str(error.filename or "a file"))
-    if error.errno == errno.ENAMETOOLONG:
-        return f"{str(path)[:60]}...: the name is too long; give a shorter one"
-    file = next((each for each in (path, *path.parents) if each.is_file()), path)
-    match error:
-        case FileExistsError() | NotADirectoryError():
-            return f"{file} is a file; give a folder"
-        case IsADirectoryError():
-            return f"{path} is a folder; give a file's name"
-        case FileNotFoundError() if not path.parent.exists():
-            return missing_folder(path)
-        case PermissionError() if path.suffix == ".part" or not path.exists():  # .part: a file that is being written
-            return f"{path.parent} cannot be written ({error.strerror}); give another folder with -o"
-    return f"{path}: {error.strerror or error}; give a path that can be read or written"
 
 
 @app.callback(invoke_without_command=True)

@@ -26,17 +26,28 @@ def demo_command(
     output: Out = Path("airborne-demo"),
     as_json: Json = False,
 ) -> None:
-    """Track the bundled example, a thrown cross, and compare it with its truth; an earlier demo's run is replaced.
+    """Track the bundled example, a thrown cross, and compare it with its truth.
+
+    An earlier demo's run is replaced, one that was stopped goes on.
 
     Example: airborne demo
     """
+    from airborne.motion.run_folder import SUMMARY
     from airborne.run.folder import holds_run_of
     from airborne.trial.examples import example_trial
     from airborne.trial.file import read_trial
 
     trial = example_trial("thrown_cross")
-    overwrite = holds_run_of(read_trial(trial), output)  # a folder with any other run is left alone
-    run = _track(trial, output, resume=False, overwrite=overwrite, pictures=True)
+    is_there = holds_run_of(read_trial(trial), output)  # a folder with any other run is left alone
+    is_begun = is_there and not (output / SUMMARY).is_file()
+    run = _track(
+        trial,
+        output,
+        resume=is_begun,
+        overwrite=is_there and not is_begun,
+        pictures=True,
+        go_on="the same command goes on",
+    )
     if not as_json:
         print(_describe(run.summary, output))
     evaluate_command(output, trial.parent / "truth.csv", digitised=trial.parent / "digitised.csv", as_json=as_json)
@@ -119,6 +130,7 @@ def _track(
     changes: dict | None = None,
     cameras: str | None = None,
     live: bool = False,
+    go_on: str = "--resume goes on",
 ) -> TrackResult:
     names = None if cameras is None else [name.strip() for name in cameras.split(",") if name.strip()]
     if names == []:
@@ -148,7 +160,7 @@ def _track(
         motion = output / _FIRST_WRITTEN[0]
         n = motion.read_text(encoding="utf-8").count("\n") - 1 if motion.is_file() else None  # below its header
         found = "what was found so far is" if n is None else f"{count(n, 'frame')} found so far, kept"
-        stop(f"{found} in {output}{'' if live else '; --resume goes on'}")
+        stop(f"{found} in {output}{'' if live else f'; {go_on}'}")
 
 
 def _describe_self_check(summary: dict) -> str | None:

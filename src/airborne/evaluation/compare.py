@@ -3,35 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from airborne.errors import ResultError
 from airborne.evaluation.columns import align_columns
+from airborne.evaluation.mix_ups import Paths, question_mix_up
+from airborne.evaluation.times import best_time_shift, match_times, span
 from airborne.evaluation.truth import Truth
 from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, wrap
 from airborne.motion import Motion
 from airborne.tracking import Status
 from airborne.types import Array, Triple
 
-_SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
 _HARDLY_ANY = 0.2  # share within two sds; 0.95 is expected
-_QUESTIONS = {
-    "position": "is this the reference of this recording, in its world",
-    "rotation": "do r00..r22 turn the body's axes into the world's, row by row, and not the other way, transposed",
-}
+_ANOTHER = "is this the reference of this recording, in its world"
+_TRANSPOSED = "do r00..r22 turn the body's axes into the world's, row by row, and not the other way, transposed"
+_TRANSPOSED_NEARER = 0.25  # chosen: share of the angle that transposed rotations leave at most
 _OTHER_WAY = 10.0  # times nearer once turned to what looks the same: no noise does that
-_FAR_MM = 20_000.0  # beyond any error of a body in a hall
-_SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
-_FARTHEST_SHIFT = 3  # chosen: periods by which the clocks are shifted relative to each other
-_MOST_FRAMES = 0.9  # chosen: shifts that leave fewer of the frames are ignored
 _CLEARLY_BETTER = 0.5  # chosen: of the unshifted distance; a constant error along the motion looks like a shift
-_FEW_TIMES = 3  # chosen: matches at least that speak for milliseconds, and more than twice those in seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +82,8 @@ class MotionComparison:
     rotation_calibration: SdCalibration
     better_shift_s: float  # added to the truth's times, this would clearly agree better; whole periods, or 0
     better_rms_3d_mm: float  # the position's error with that shift
+    is_transposed: bool  # the truth's rotations are clearly nearer the other way round
+    mix_up: str  # a question about the truth's unit, axes or times where these explain why it is far; else ""
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
@@ -130,21 +126,17 @@ class MotionComparison:
                     f"{name} errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
                     f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
                 )
-            if share.n and share.within_2sd < _HARDLY_ANY:
-                lines.append(f"hardly any {name} lies within 2 sd: {_QUESTIONS[name]}?")
-        if self.better_shift_s:
+            if share.n and share.within_2sd < _HARDLY_ANY and not self.mix_up:
+                question = _TRANSPOSED if name == "rotation" and self.is_transposed else _ANOTHER
+                lines.append(f"hardly any {name} lies within 2 sd: {question}?")
+        if self.mix_up:
+            lines.append(self.mix_up)
+        elif self.better_shift_s:
             lines.append(
                 f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, the RMS in space would be "
                 f"{self.better_rms_3d_mm:.2f} mm: do both clocks start at the same frame?"
             )
-        lines += question_units(position.rms_3d_mm)
         return "\n".join(lines)
-
-
-def question_units(distance_mm: float) -> list[str]:
-    """Ask in one line whether a reference so far away is in millimetres; nothing where it is near."""
-    far = f"the reference lies {distance_mm / 1e3:.0f} m from the run; is it in millimetres? Tables hold metres"
-    return [far] if distance_mm > _FAR_MM else []
 
 
 def _rows(names: Sequence[str], rms: Sequence[float], largest: Sequence[float]) -> list[tuple[str, str, str]]:
@@ -170,6 +162,7 @@ def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) ->
     R, true_R = motion.R[frames], truth.R[rows]
     equivalent_R = R[:, None] @ np.stack(list(symmetries))  # (n, symmetries, 3, 3)
     angle = geodesic(equivalent_R, true_R[:, None])
+    transposed_angle = geodesic(equivalent_R, np.swapaxes(true_R, -1, -2)[:, None]).min(axis=1)
     nearest = np.argmin(angle, axis=1)
     nearest_R = equivalent_R[np.arange(len(R)), nearest]
     best = int(np.argmin(np.mean(angle**2, axis=0)))
@@ -202,49 +195,12 @@ def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) ->
         rotation_calibration=sd_calibration(rotation_error, motion.rotation_sd[frames]),
         better_shift_s=shift_s,
         better_rms_3d_mm=shifted_mm,
+        is_transposed=bool(_rms(transposed_angle) < _TRANSPOSED_NEARER * _rms(angle.min(axis=1))),
+        mix_up=question_mix_up(
+            Paths(motion.time_s, np.where(motion.has_pose[:, None], motion.position, np.nan)[:, None]),
+            Paths(truth.time_s, truth.position[:, None]),
+        ),
     )
-
-
-def best_time_shift(
-    time_s: Array, unshifted_mm: float, error_at: Callable[[float], tuple[float, int]], clearly_better: float
-) -> tuple[float, float]:
-    """Shift a reference's clock by whole periods: return the best shift [s] and its error [mm].
-
-    `error_at` returns the error [mm] with a shift [s] added to its times, and how many values are compared then. The
-    best is 0 unless another leaves less than a share, `clearly_better`, of the error.
-    """
-    if len(time_s) < 2 or math.isnan(unshifted_mm):
-        return 0.0, unshifted_mm
-    period, best = float(np.median(np.diff(time_s))), (0.0, unshifted_mm)
-    shifted = {step: error_at(step * period) for step in range(-_FARTHEST_SHIFT, _FARTHEST_SHIFT + 1)}
-    for step, (error_mm, n) in shifted.items():
-        if n >= _MOST_FRAMES * shifted[0][1] and error_mm < min(best[1], clearly_better * unshifted_mm):
-            best = step * period, error_mm
-    return best
-
-
-def match_times(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Match times: rows of the motion, rows of the truth nearest in time, and their time offsets [s].
-
-    Raises ResultError where hardly any match, and many would if the truth's were milliseconds.
-    """
-    matched = _match(time_s, true_time_s)
-    n = len(matched[0])
-    if 2 * n < len(time_s) and len(_match(time_s, true_time_s / 1000)[0]) > max(_FEW_TIMES - 1, 2 * n):
-        raise ResultError(
-            f"the reference's times are {span(true_time_s)}, the run's {span(time_s)}: are they in milliseconds? "
-            "time_s holds seconds; divide it by 1000"
-        )
-    return matched
-
-
-def _match(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    periods = [float(np.median(np.diff(t))) for t in (time_s, true_time_s) if len(t) > 1]
-    reach = _SAME_SHARE * min(periods) if periods else _SAME_TIME_S
-    rows = np.searchsorted((true_time_s[1:] + true_time_s[:-1]) / 2, time_s)
-    offset = np.abs(time_s - true_time_s[rows])
-    frames = np.flatnonzero(offset < reach)
-    return frames, rows[frames], offset[frames]
 
 
 def _position_errors(error: Array) -> PositionErrors:
@@ -281,11 +237,6 @@ def _rms(values: Array) -> Array:
 def _triple(values: Array) -> Triple:
     x, y, z = values.tolist()
     return x, y, z
-
-
-def span(time_s: Array) -> str:
-    """Format the range of times."""
-    return f"{time_s[0]:.3f} to {time_s[-1]:.3f} s" if len(time_s) else "empty"
 
 
 def or_dash(number: float, form: str) -> str:

@@ -12,16 +12,14 @@ from airborne.errors import ResultError
 from airborne.evaluation.columns import align_columns
 from airborne.evaluation.compare import (
     SdCalibration,
-    best_time_shift,
-    match_times,
     nan_to_none,
     or_dash,
-    question_units,
     sd_calibration,
-    span,
 )
 from airborne.evaluation.coverage import Coverage, coverage_of
 from airborne.evaluation.joint_files import JointPaths, landmark_of
+from airborne.evaluation.mix_ups import Paths, question_mix_up
+from airborne.evaluation.times import best_time_shift, match_times, span
 from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
 from airborne.tracking import Status
 from airborne.types import Array, Triple
@@ -67,6 +65,7 @@ class JointComparison:
     coverage_by_frame: Coverage  # of those errors by the deviations of single frames, without what lasts all run long
     better_shift_s: float  # added to the reference's times, this would clearly agree better; whole periods, or 0
     better_mean_without_offset_mm: float  # the error with that shift
+    mix_up: str  # a question about unit, axes, sides or times where these explain why the reference is far; else ""
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
@@ -86,12 +85,13 @@ class JointComparison:
             table.append((f"  {name}", *(or_dash(number, ".1f") for number in numbers)))
         lines += align_columns(table, (18, 9, 9, 9, 11))
         lines.append("no offset: the mean without a constant offset in the segment, as between two definitions")
-        if self.better_shift_s:
+        if self.mix_up:
+            lines.append(self.mix_up)
+        elif self.better_shift_s:
             lines.append(
                 f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
                 f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?"
             )
-        lines += question_units(self.whole.rms_mm)
         share = self.calibration
         if share.n:
             lines.append(
@@ -190,6 +190,7 @@ def compare_joints(
         coverage_by_frame=_coverage(pairs, sd_by_frame[frames]),
         better_shift_s=shift_s,
         better_mean_without_offset_mm=shifted_mm,
+        mix_up=question_mix_up(Paths(motion.time_s, measured), Paths(reference.time_s, reference.points), names),
     )
 
 

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError, count
-from airborne.evaluation.compare import match_times, nan_to_none, or_dash, question_units, span
+from airborne.evaluation.compare import nan_to_none, or_dash
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
+from airborne.evaluation.mix_ups import question_units
 from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
 from airborne.evaluation.success import Cover, success_cover
+from airborne.evaluation.times import match_times, span
 from airborne.geometry.sampling import chi2_quantile
 from airborne.motion.players import PlayersMotion, read_players
 from airborne.tracking import Status
@@ -148,7 +150,7 @@ def compare_players(
             rig,
             is_visible,
         )
-    others = [name for name in (*motion.players, *motion.joints) if name not in (*truth.players, *truth.joints)]
+    theirs = (*truth.players, *truth.joints)
     return PlayersComparison(
         n_frames=len(motion),
         n_truth=len(truth),
@@ -156,7 +158,7 @@ def compare_players(
         largest_time_offset_s=float(offset.max()),
         players=errors,
         jumps=compare_jumps(motion, truth, players, reference_jumps or {}),
-        not_compared=tuple(others),
+        not_compared=tuple(name for name in (*motion.players, *motion.joints) if name not in theirs),
     )
 
 
@@ -292,8 +294,7 @@ def _error_lines(player: str, errors: PlayerErrors) -> list[str]:
         reach = ", ".join(f"{name} {metres:.3f}" for name, metres in errors.cover.tolerance_m.items())
         lines.append(f"  cover lets a part be off by [m]: {reach}")
     if errors.n_losses:
-        mean_s, longest_s = errors.mean_recovery_s, errors.longest_recovery_s
-        recovery = f"recovered after {mean_s:.2f} s on the mean, {longest_s:.2f} s at most"
-        recovery = "not recovered" if math.isnan(mean_s) else recovery
+        mean, longest = (f"{each:.2f} s" for each in (errors.mean_recovery_s, errors.longest_recovery_s))
+        recovery = "not recovered" if mean == "nan s" else f"recovered after {mean} on the mean, {longest} at most"
         lines.append(f"  off by more than 100 mm {count(errors.n_losses, 'time')}; {recovery}")
     return lines

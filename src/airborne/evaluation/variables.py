@@ -12,10 +12,10 @@ import numpy as np
 from airborne.body import BodyModel
 from airborne.errors import ResultError
 from airborne.evaluation.agreement import Series
-from airborne.evaluation.compare import match_times, span
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.evaluation.jump_errors import HEIGHTS
 from airborne.evaluation.table import read_table
+from airborne.evaluation.times import match_times, span
 from airborne.geometry.rotations import (
     angles_from_matrix,
     geodesic,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -17,6 +18,7 @@ from airborne.tracking import Status
 from airborne.tracking.methods import UNREAD_SETTINGS
 
 UNKNOWN_TEXT = "not known"
+_MOST_DIGITS = 5  # chosen: after the point, of a number with a standard deviation
 _UNITS = {"_m": "m", "_mm": "mm", "_s": "s", "_hz": "1/s", "_px": "px", "_deg": "°", "_rev": "turns"}
 
 
@@ -70,6 +72,16 @@ def format_value(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(format_value, value))
     return str(value)
+
+
+def format_with_sd(value: float | None, sd: float | None) -> str:
+    """Show a value with its standard deviation, of which two digits count; of an unknown one two decimals."""
+    if value is None:
+        return UNKNOWN_TEXT
+    if not sd or not math.isfinite(sd):
+        return f"{value:.2f}".replace("-", "−")
+    digits = min(max(1 - math.floor(math.log10(sd)), 0), _MOST_DIGITS)
+    return f"{value:.{digits}f} ± {sd:.{digits}f}".replace("-", "−")
 
 
 def _records_table(records: Sequence[Mapping[str, Any]]) -> HtmlTable:

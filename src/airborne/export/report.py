@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from airborne.errors import ResultError
 from airborne.export.methods_text import SURFACES
-from airborne.export.page import UNKNOWN_TEXT, HtmlTable, render_report
+from airborne.export.page import UNKNOWN_TEXT, HtmlTable, format_with_sd, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
 from airborne.export.viewer import Viewer
 from airborne.io.writing import write_text
@@ -170,7 +170,9 @@ def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "cannot be seen", "turns: in every frame some direction of the orientation is hidden"
     else:
         for turn in ("somersault", "twist"):
-            yield _turns(head[f"{turn}_rev"], head[f"{turn}_rev_sd"]), f"{turn}, first to last pose that shows it"
+            turns, sd = head[f"{turn}_rev"], head[f"{turn}_rev_sd"]
+            text = format_with_sd(turns, sd) + (" turns" if turns is not None else "")
+            yield text, f"{turn}, first to last pose that shows it"
         low, high = head["tilt_range_deg"]
         yield UNKNOWN_TEXT if low is None else f"{round(low)}° to {round(high)}°".replace("-", "−"), "tilt"
     ranges = head["range_m"]
@@ -190,11 +192,6 @@ def _median_sd(head: Mapping[str, Any], what: str, unit: str) -> str:
 
 def _with_unit(value: float | None, form: str) -> str:
     return UNKNOWN_TEXT if value is None else form.format(value).replace("-", "−")
-
-
-def _turns(turns: float | None, sd: float | None) -> str:
-    """Return a number of turns with its standard deviation, where that is known."""
-    return _with_unit(turns, "{:.2f} turns" if sd is None or turns is None else f"{{:.2f}} ± {sd:.2f} turns")
 
 
 def _comparisons(summary: Mapping[str, Any]) -> Iterator[_Comparison]:
@@ -263,9 +260,11 @@ def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:
         for axis, *pair in zip("xyz", mean, sd, strict=True)
     ]
     rows += [
-        (f"its scatter from frame to frame about {axis} [kg m²/s]", each, "")
+        (f"its standard deviation over the frames about {axis} [kg m²/s]", each, "")
         for axis, each in zip("xyz", scatter, strict=True)
     ]
+    if flight["fitted_gravity_m_s2"] is None:
+        return HtmlTable([*rows, ("free fall", "none found", "")])
     rows.append(
         (
             "downward acceleration of the centre of mass [m/s²]: fitted, free fall",

@@ -21,11 +21,12 @@ from airborne.calibration import (
 )
 from airborne.calibration import calibrate as calibrate_points
 from airborne.calibration.acceptance import require_plausible
-from airborne.errors import AirborneError, require_choice
+from airborne.errors import AirborneError, RunThereError, require_choice
 from airborne.interface.arguments import (
     FilePath,
     as_list,
     check_times,
+    explain_paths,
     folder_of,
     report_progress,
     report_stages,
@@ -50,6 +51,7 @@ _SCENES = ("cross", "somersault", "block")
 _SMOOTHINGS = ("butterworth", "spline", "kalman")
 
 
+@explain_paths
 def read_trial(path: FilePath, *, cameras: Sequence[str] | None = None, **track: Any) -> Trial:
     """Read a trial file; keywords replace entries of its [track] table, `cameras` selects cameras by name.
 
@@ -62,6 +64,7 @@ def read_trial(path: FilePath, *, cameras: Sequence[str] | None = None, **track:
     return read_trial_file(to_path(path), track, cameras)
 
 
+@explain_paths
 def track(
     trial: Trial | FilePath,
     folder: FilePath,
@@ -82,11 +85,17 @@ def track(
     Run('again'): thrown cross, half-twisting somersault, 5 frames: 5 tracked, 0 uncertain, 0 lost
     """
     trial = trial if isinstance(trial, Trial) else read_trial(trial)
-    with report_progress(progress, f"tracking {trial.name}") as report:
-        track_trial(trial, to_path(folder), resume=resume, overwrite=overwrite, pictures=pictures, progress=report)
+    try:
+        with report_progress(progress, f"tracking {trial.name}") as report:
+            track_trial(trial, to_path(folder), resume=resume, overwrite=overwrite, pictures=pictures, progress=report)
+    except RunThereError as error:
+        raise RunThereError(
+            f"{folder} already holds a run; give resume=True, overwrite=True or another folder"
+        ) from error
     return read_run(folder)
 
 
+@explain_paths
 def read_run(folder: FilePath) -> Run:
     """Return the run in a folder, finished or not; raises ResultError where there is none.
 
@@ -96,6 +105,7 @@ def read_run(folder: FilePath) -> Run:
     return Run(to_path(folder).absolute())
 
 
+@explain_paths
 def calibrate(
     sources: FilePath,
     *,
@@ -134,6 +144,7 @@ def calibrate(
     return calibration
 
 
+@explain_paths
 def fit_body(
     trial: Trial | FilePath,
     output: FilePath,
@@ -156,6 +167,7 @@ def fit_body(
         return fit_person(trial, to_path(output), n_frames=n_frames, skeleton=skeleton, progress=report)
 
 
+@explain_paths
 def evaluate(
     run: Run | FilePath,
     truth: FilePath | None = None,
@@ -193,6 +205,7 @@ def evaluate(
     return comparisons
 
 
+@explain_paths
 def smooth(
     run: Run | FilePath,
     method: Literal["butterworth", "spline", "kalman"] | None = None,
@@ -224,6 +237,7 @@ def smooth(
         return smooth_run(folder_of(run), settings, events_s=times_s, out=out, progress=report)
 
 
+@explain_paths
 def export_run(
     run: Run | FilePath, *formats: str, output: FilePath | None = None, progress: bool | StageProgress = False
 ) -> ExportResult:
@@ -241,6 +255,7 @@ def export_run(
         return write_export(folder_of(run), None if output is None else to_path(output), formats, report)
 
 
+@explain_paths
 def synthesise(
     scene: Literal["cross", "somersault", "block"],
     folder: FilePath,

@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from os import PathLike
 from pathlib import Path
+from typing import ParamSpec, TypeVar
 
 from airborne.errors import AirborneError
 from airborne.io.names import to_path
 from airborne.io.terminal import Stages
 from airborne.io.terminal import progress as progress_bar
+from airborne.io.writing import describe_path_error
 from airborne.run.result import Run
 from airborne.types import Progress, StageProgress
 
 FilePath = str | PathLike[str]
+_Given = ParamSpec("_Given")
+_Found = TypeVar("_Found")
+
+
+def explain_paths(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
+    """Let a function raise an AirborneError, in one line, for a path that cannot be read or written."""
+
+    @wraps(function)
+    def explained(*args: _Given.args, **kwargs: _Given.kwargs) -> _Found:
+        try:
+            return function(*args, **kwargs)
+        except OSError as error:
+            raise AirborneError(describe_path_error(error)) from error
+
+    return explained
 
 
 def as_list(given: FilePath | Run | Sequence[FilePath | Run]) -> Sequence[FilePath | Run]:

@@ -34,6 +34,24 @@ def missing_folder(path: Path) -> str:
     return f"{path}: there is no folder {path.parent}; make it, or give another path"
 
 
+def describe_path_error(error: OSError, elsewhere: str = "give another folder") -> str:
+    """Describe what is wrong with the path of a file error; `elsewhere` is what to do where a folder is closed."""
+    path = Path(str(error.filename or "a file"))
+    if error.errno == errno.ENAMETOOLONG:
+        return f"{str(path)[:60]}...: the name is too long; give a shorter one"
+    file = next((each for each in (path, *path.parents) if each.is_file()), path)
+    match error:
+        case FileExistsError() | NotADirectoryError():
+            return f"{file} is a file; give a folder"
+        case IsADirectoryError():
+            return f"{path} is a folder; give a file's name"
+        case FileNotFoundError() if not path.parent.exists():
+            return missing_folder(path)
+        case PermissionError() if path.suffix == ".part" or not path.exists():  # .part: a file that is being written
+            return f"{path.parent} cannot be written ({error.strerror}); {elsewhere}"
+    return f"{path}: {error.strerror or error}; give a path that can be read or written"
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file."""
     with explain_full_disk(path):

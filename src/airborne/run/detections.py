@@ -8,10 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.calibration.initial.resection import find_misplaced_cameras, resect_cameras
+from airborne.calibration.initial.resection import (
+    find_exchanged_detections,
+    find_misplaced_cameras,
+    resect_cameras,
+)
 from airborne.cameras import Rig
 from airborne.cameras.consensus import triangulate_consensus
 from airborne.cameras.detections import Detections, landmarks_from_points, read_detections
+from airborne.errors import MistakesError
 from airborne.tracking.first_pose import LEAST_VISIBILITY
 from airborne.trial.cameras import CameraTable
 from airborne.trial.file import Trial
@@ -65,9 +70,11 @@ def read_forms_detections(trial: Trial, forms: PoseForms, facts: Sequence[VideoF
 def resect_moved_cameras(rig: Rig, detections: TrialDetections, moved: Sequence[str]) -> tuple[Rig, tuple[str, ...]]:
     """Resect the cameras named as moved; the notes say what changed, and which others disagree.
 
-    Raises CalibrationError where a camera cannot be resected.
+    Raises CalibrationError where a camera cannot be resected, and MistakesError where two cameras' are exchanged.
     """
     synchronous = detections.synchronous()
+    if (exchanged := find_exchanged_detections(rig, synchronous)) is not None:
+        raise MistakesError("the detections", [exchanged.sentence])
     notes = []
     if moved:
         rig, done = resect_cameras(rig, synchronous, moved)

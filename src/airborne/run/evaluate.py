@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import mimetypes
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -44,7 +45,7 @@ from airborne.export.viewer import body_viewer
 from airborne.io.text import read_text
 from airborne.io.writing import write_text
 from airborne.motion import run_folder
-from airborne.motion.run_folder import check_record, holds_players, read_body_run
+from airborne.motion.run_folder import check_record, holds_players, read_body_run, read_record
 from airborne.run.folder import open_results
 from airborne.run.provenance import versions
 from airborne.run.reference_series import body_series, players_series
@@ -178,6 +179,7 @@ def evaluate_agreement(
         raise ResultError("clicks of other people are compared with the first person's; give those as --digitised")
     _check_different("--repeat", (folder, *repeats), "another run")
     _check_different("--operator", (digitised or Path(), *operators), "another person's clicks")
+    _check_same_videos(folder, repeats)
     if holds_players(folder):
         if digitised or joints or joint_angles:
             raise ResultError(f"{folder} holds a run of players; give a truth.csv of players, or other runs of it")
@@ -240,3 +242,28 @@ def _check_different(option: str, paths: Sequence[Path], wanted: str) -> None:
     for i, path in enumerate(paths):
         if resolved[i] in resolved[:i]:
             raise ResultError(f"{option} {path} would be compared with itself and agree perfectly; give {wanted}")
+
+
+def _check_same_videos(folder: Path, repeats: Sequence[Path]) -> None:
+    """Raise ResultError where a run has no video in common with the run in a folder, as far as both name theirs."""
+    videos = _recorded_videos(folder)
+    for other in repeats:
+        others = _recorded_videos(other)
+        if videos and others and not set(videos) & set(others):
+            names = ", ".join([*others.values()][:3])
+            raise ResultError(
+                f"{other} is a run of other videos ({names}) than {folder}; give a run of the same trial; a run of "
+                "other cameras is compared by its joints.csv, as paths of joints"
+            )
+
+
+def _recorded_videos(folder: Path) -> dict[str, str]:
+    """Return the names of the videos of the run in a folder by their digests; {} where it names none."""
+    record = folder / run_folder.RUN_RECORD
+    inputs = read_record(record).get("inputs") if record.is_file() else None
+    named = inputs.items() if isinstance(inputs, dict) else ()
+    return {
+        digest: name
+        for name, digest in named
+        if isinstance(digest, str) and (mimetypes.guess_type(name)[0] or "").startswith("video/")
+    }

@@ -16,7 +16,7 @@ from PIL import Image as GifPicture
 from airborne.errors import ResultError
 from airborne.export.lettering import draw_text, text_width
 from airborne.export.palette import TEXT_RGB
-from airborne.motion.run_folder import VIDEOS, holds_players, read_body_run, read_players_run
+from airborne.motion.run_folder import SUMMARY, VIDEOS, holds_players, read_body_run, read_players_run
 from airborne.types import Array, Image, Progress
 from airborne.video import VideoSource, VideoWriter
 from airborne.video.seeking import ImageReader, index_images
@@ -85,7 +85,10 @@ def _open(folder: Path, n: int) -> list[ImageReader]:
     readers = [ImageReader(source, index_images(source)) for source in sources]
     short = [path.name for path, reader in zip(paths, readers, strict=True) if len(reader.index) != n]
     if short:
-        raise ResultError(f"{', '.join(short)} does not hold the run's {n} frames; track again")
+        hold = "does not hold" if len(short) == 1 else "do not hold"
+        is_finished = (folder / SUMMARY).is_file()
+        mend = "track again" if is_finished else "the run is not finished; finish it with `airborne track --resume`"
+        raise ResultError(f"{', '.join(short)} {hold} the run's {n} frames; {mend}")
     return readers
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from airborne import __version__
 from airborne.body.files import mesh_files
 from airborne.cameras.files import files_beside
-from airborne.errors import ResultError
+from airborne.errors import ResultError, RunThereError
 from airborne.export import write_json
 from airborne.io.files import file_digest
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
@@ -76,7 +76,7 @@ def prepare_folder(
         read_record(record)
         _remove_run(folder)
     if rows.exists() and not resume:
-        raise ResultError(
+        raise RunThereError(
             f"{folder} already holds a run; resume it (--resume), overwrite it (--overwrite), or give another folder"
         )
     if not rows.exists():

@@ -21,6 +21,7 @@ _GREY = "#333333"
 _PANEL_IN = 2.6  # height
 _COLUMNS = 3  # of the athletes' panels
 _DPI = 300  # of print
+_TRIAL, _EACH, _ALL = "a trial", "an athlete's means", "mean ± sd of athletes"  # what the figure of a number shows
 
 
 def write_comparison_figures(folder: Path, comparison: VariableComparison, stem: str) -> list[Path]:
@@ -44,7 +45,7 @@ def _curves(comparison: VariableComparison, axis: Array) -> Figure:
     for k, condition in enumerate(comparison.conditions):
         means = np.stack([cells.mean(athlete, k) for athlete in cells.athletes_in(k)])
         _band(grid[0], axis, means, colour=_colour(k), text=f"{condition}, n = {len(means)}")
-    panels.label_panel(grid[0], comparison.title)
+    panels.label_panel(grid[0], f"{comparison.title}\nmean ± sd of athletes")
     grid[0].legend(fontsize=panels.FONT_PT - 1, frameon=False, labelcolor=panels.TEXT)
     for contrast, upper, lower in zip(contrasts, grid[1::2], grid[2::2], strict=True):
         _draw_difference(upper, axis, contrast, comparison.title)
@@ -99,7 +100,7 @@ def _athletes(comparison: VariableComparison, axis: Array) -> Figure:
         axes.set_title(comparison.athletes[athlete], fontsize=panels.FONT_PT, color=panels.TEXT)
         axes.legend(fontsize=panels.FONT_PT - 2, frameon=False, labelcolor=panels.TEXT)
     figure.supxlabel(comparison.axis_label, fontsize=panels.FONT_PT, color=panels.TEXT)
-    figure.supylabel(comparison.title, fontsize=panels.FONT_PT, color=panels.TEXT)
+    figure.supylabel(f"{comparison.title}, mean ± sd of trials", fontsize=panels.FONT_PT, color=panels.TEXT)
     return figure
 
 
@@ -118,16 +119,18 @@ def _numbers(comparison: VariableComparison) -> Figure:
     axes, cells = figure.subplots(), comparison.cells
     for athlete in range(len(comparison.athletes)):
         own = [k for k in range(len(comparison.conditions)) if athlete in cells.athletes_in(k)]
-        axes.plot(own, [cells.mean(athlete, k)[0] for k in own], color=_GREY, alpha=0.4, linewidth=0.8)
+        axes.plot(own, [cells.mean(athlete, k)[0] for k in own], color=_GREY, alpha=0.4, linewidth=0.8, label=_EACH)
     for k in range(len(comparison.conditions)):
         values = cells.values[cells.condition == k, 0]
-        axes.plot(np.full(len(values), k), values, "o", color=_colour(k), alpha=0.5, markersize=3)
+        axes.plot(np.full(len(values), k), values, "o", color=_colour(k), alpha=0.5, markersize=3, label=_TRIAL)
         means = np.array([cells.mean(athlete, k)[0] for athlete in cells.athletes_in(k)])
         sd = means.std(ddof=1) if len(means) > 1 else 0.0
-        axes.errorbar([k + 0.15], [means.mean()], [sd], fmt="s", color=_colour(k), capsize=3, markersize=5)
+        axes.errorbar([k + 0.15], [means.mean()], [sd], fmt="s", color=_colour(k), capsize=3, markersize=5, label=_ALL)
     axes.set_xticks(range(len(comparison.conditions)), comparison.conditions)
     axes.set_xlim(-0.5, len(comparison.conditions) - 0.5)
     panels.label_panel(axes, label(comparison.variable))
+    shown = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))  # one of each
+    figure.legend(shown.values(), shown, loc="outside lower center", fontsize=panels.FONT_PT - 2, frameon=False)
     return figure
 
 

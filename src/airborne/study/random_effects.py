@@ -1,7 +1,7 @@
 """Differences between two conditions from several trials of several athletes, node by node of a curve.
 
 Three levels of chance: between athletes, between an athlete's trials, and the measurement of one trial. The analysis
-has two stages. In the first, each athlete's mean in each condition gets the variance of a mean of his trials: the
+has two stages. In the first, each athlete's mean in each condition gets the variance of a mean of their trials: the
 pooled variance within athletes and conditions, which holds the measurement's. In the second these means are pooled as
 in a random-effects meta-analysis: the variance between athletes by Paule and Mandel 1982, the interval by Hartung and
 Knapp 2001 ("A refined method for the meta-analysis of controlled clinical trials with binary outcome") with Student's

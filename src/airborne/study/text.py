@@ -27,8 +27,8 @@ _REFERENCES = {
     ),
 }
 _LEVELS = {
-    "within athletes": "within {} who have both",
-    "between athletes": "between athletes ({}), as too few have both",
+    "within athletes": "within {} with trials in both conditions",
+    "between athletes": "between athletes ({}), as too few have trials in both conditions",
     "between trials": "between the trials of one athlete, and so of that athlete only",
 }
 
@@ -38,8 +38,17 @@ _NOT_REPEATED = (
 )
 
 
-def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[str], *, real_time: bool) -> str:
-    """Return a methods paragraph, one of results, what was left out, and the references."""
+def describe_study(
+    comparisons: Sequence[VariableComparison],
+    events: Sequence[str],
+    *,
+    real_time: bool,
+    left_out: Sequence[str] = (),
+) -> str:
+    """Return a methods paragraph, one of results, what was left out, and the references.
+
+    `left_out` says which trials no comparison has; each comparison names its own.
+    """
     curves = [each for each in comparisons if each.axis is not None]
     numbers = [each for each in comparisons if each.axis is None]
     levels = dict.fromkeys(contrast.difference.level for each in comparisons for contrast in each.contrasts)
@@ -53,7 +62,7 @@ def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[s
     are_repeated = [bool(np.isfinite(each.spread.mdc).any()) for each in comparisons]
     if any(are_repeated):
         text.append(
-            "Each athlete's mean in each condition has the variance of a mean of his trials, pooled within athletes "
+            "Each athlete's mean in each condition has the variance of a mean of their trials, pooled within athletes "
             "and conditions, which holds the error of the measurement."
         )
     if not all(are_repeated):
@@ -80,7 +89,7 @@ def describe_study(comparisons: Sequence[VariableComparison], events: Sequence[s
         )
     lines = ["Methods", " ".join(text), "", "Results"]
     lines += [f"{each.title}: {sentence}" for each in comparisons for sentence in _results(each)]
-    left_out = list(dict.fromkeys(line for each in comparisons for line in each.left_out))
+    left_out = list(dict.fromkeys([*(line for each in comparisons for line in each.left_out), *left_out]))
     lines += [
         "",
         "Left out",
@@ -105,15 +114,15 @@ def _results(comparison: VariableComparison) -> list[str]:
     ]
     typical = (float(np.median(each)) for each in (spread.sd_within, spread.sd_measurement, spread.mdc))
     within, measured, mdc = typical
-    where = "" if comparison.axis is None else "median over the curve: "
+    over = "" if comparison.axis is None else ", median over the curve,"
     stated = "the runs state none for the measurement"
     if measured:
         stated = f"the runs state {measured:.3g} for the measurement, errors included that trials share"
     if np.isnan(within):
-        return [*sentences, f"{_NOT_REPEATED} ({where}{stated})."]
+        return [*sentences, f"{_NOT_REPEATED} ({stated}{over.removesuffix(',') if measured else ''})."]
     sentences.append(
-        f"{where}standard deviation of trials of one athlete and condition {within:.3g} ({stated}); minimal detectable "
-        f"change of a trial {mdc:.3g}."
+        f"standard deviation between trials of one athlete and condition{over} {within:.3g} ({stated}); "
+        f"minimal detectable change of a trial {mdc:.3g}."
     )
     return sentences
 

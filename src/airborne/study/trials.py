@@ -84,13 +84,14 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
         raise ResultError(
             f"{folder / TABLE}: lacks {', '.join(sorted(_NEEDED - set(names))) or 'names of its own'}; {_FORM}"
         )
-    trials, left_out = [], []
+    trials, left_out, others = [], [], list[str]()
     for _, cells in lines:
         if len(cells) != len(names):
             raise ResultError(f"{folder / TABLE}: {len(cells)} cells in a row, expected {len(names)}; {_FORM}")
         row = dict(zip(names, cells, strict=True))
         athlete = row.get(ATHLETE) or row.get("player", "")
         if conditions and row[CONDITION] not in conditions:
+            others += [row[CONDITION]] * bool(athlete and row[CONDITION] and row["status"] == "done")
             continue
         if row["status"] != "done":
             left_out.append(f"{row['trial']}: {row['status']}: {row['error']}")
@@ -98,6 +99,9 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
             left_out.append(f"{row['trial']}: has no label {CONDITION if athlete else ATHLETE}")
         else:
             trials.append(StudyTrial(row["trial"], athlete, row[CONDITION], _folder_of(folder, row), row))
+    if not trials and others and not left_out:
+        there = ", ".join(dict.fromkeys(others))
+        raise ResultError(f"{folder / TABLE}: no trial of condition {' or '.join(conditions)}; it has: {there}")
     if not trials:
         why = f"; {left_out[0]}" if left_out else ""
         raise ResultError(f"{folder / TABLE}: no finished trial with labels {ATHLETE} and {CONDITION}{why}")

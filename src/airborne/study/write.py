@@ -58,9 +58,7 @@ def write_comparison(
         _write_table(folder / CLUSTERS, (row for each in compared for row in _clusters(each)))
     for each, stem in zip(compared, stems, strict=True):
         write_comparison_figures(folder, each, stem)
-    text = describe_study(compared, events, real_time=real_time)
-    left_out = "".join(f"{line}\n" for line in study.left_out)
-    text = text.replace("\nReferences\n", f"{left_out}\nReferences\n") if left_out else text
+    text = describe_study(compared, events, real_time=real_time, left_out=study.left_out)
     if twins := describe_twins(study.trials):
         text = "\n".join(["Read this first", *twins, "", text])
     write_text(folder / TEXT, text)

@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_
 
 from airborne.body import SAMPLED, BodyModel, human18, human18_from_measurements
 from airborne.body.files import read_body
-from airborne.errors import MistakesError, TrialError, list_mistakes
+from airborne.errors import MOST_SAID, MistakesError, TrialError, list_mistakes
 from airborne.io.names import ColumnName, Name, check_path
 from airborne.io.text import list_keys, read_toml
 from airborne.tracking.methods import Settings
@@ -137,7 +137,7 @@ class Trial(SettingsTable):
             super().__init__(**tables)
         except ValidationError as error:
             places = [one["loc"] for one in error.errors(include_url=False)]
-            raise MistakesError("Trial", list_mistakes(error, METHODS, tables, Trial), places) from None
+            raise MistakesError("Trial", list_mistakes(error, METHODS, tables, Trial), places, MOST_SAID) from None
 
     _folder: Path = PrivateAttr(default=Path())
 

@@ -5,7 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.calibration.initial.resection import find_misplaced_cameras, resect, resect_cameras
+from airborne.calibration.initial.resection import (
+    find_exchanged_detections,
+    find_misplaced_cameras,
+    resect,
+    resect_cameras,
+)
 from airborne.cameras import Rig
 from airborne.errors import CalibrationError
 from tests.support.people_seen import four_cameras, knocked, seen, walking
@@ -121,6 +126,32 @@ def test_cameras_in_their_places_are_not_named_however_scattered_the_detections(
 def test_two_cameras_cannot_tell():
     pair = knocked(TRUE, "side").select(["left", "side"])
     assert find_misplaced_cameras(pair, seen(TRUE, walking())) == ()
+
+
+def exchanged(detections, *pair):
+    """Detections in which two cameras, by their columns, have each other's."""
+    px, columns = detections.px.copy(), list(pair)
+    px[:, :, columns] = px[:, :, columns[::-1]]
+    return replace(detections, px=px)
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (1, 3)])
+@pytest.mark.parametrize("rig", [TRUE, knocked(TRUE, "side")])
+def test_detections_of_two_cameras_that_are_exchanged_are_named(rig, pair):
+    found = find_exchanged_detections(rig, exchanged(seen(TRUE, walking(), sd_px=2.0), *pair))
+    assert found.cameras == tuple(TRUE.names[k] for k in pair)
+    assert "once those of" in found.sentence and "detections_cameras" in found.sentence
+
+
+@pytest.mark.parametrize("sd_px", [1.0, 15.0])
+@pytest.mark.parametrize("rig", [TRUE, knocked(TRUE, "side"), knocked(TRUE, "side").select(["left", "side"])])
+def test_of_detections_of_their_own_cameras_none_are_called_exchanged(rig, sd_px):
+    assert find_exchanged_detections(rig, seen(TRUE, walking(), sd_px=sd_px)) is None
+
+
+def test_a_camera_that_stands_nowhere_is_not_mended():
+    with pytest.raises(CalibrationError, match=r"camera 'side' cannot be mended: wherever it stands, half of its \d+"):
+        resect_cameras(TRUE, exchanged(seen(TRUE, walking()), 0, 1), ["side"])
 
 
 def test_what_cannot_be_resected_is_refused():

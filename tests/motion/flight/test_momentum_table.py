@@ -115,6 +115,13 @@ def test_a_body_that_does_not_fall_freely_is_detected_by_its_gravity_and_its_dis
     assert summary.ballistic_rms_mm == pytest.approx(1e3 * expected, rel=ROUNDTRIP)
 
 
+@pytest.mark.parametrize(("gravity", "falls"), [(0.0, False), (1.5, False), (9.81, True), (20.0, True)])
+def test_a_fall_is_stated_only_where_the_body_falls_somewhere(gravity, falls):
+    summary = summarise(motion_of(MODEL, falling(gravity), covariance=small_covariance(MODEL)))
+    stated = (summary.fitted_gravity_m_s2, summary.fitted_gravity_sd_m_s2, summary.ballistic_rms_mm)
+    assert np.isfinite(stated).tolist() == [falls] * 3
+
+
 def test_deviation_of_the_fitted_gravity_is_that_of_paths_whose_errors_resemble_the_ones_before():
     rng, time_s, n = np.random.default_rng(5), np.arange(80) / 60, 300
     error = lfilter([1.0], [1.0, -0.7], 0.003 * rng.normal(size=(n, len(time_s))), axis=1)

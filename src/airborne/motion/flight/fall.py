@@ -121,6 +121,13 @@ def is_free_fall(acceleration: Array, sd: Array) -> NDArray[np.bool_]:
     return np.abs(acceleration + GRAVITY_M_S2) <= np.minimum(_FREE_M_S2 + 2 * sd, _MOST_M_S2)
 
 
+def may_fall(time_s: Array, height_m: Array, variance: Array) -> bool:
+    """Whether heights (n,) [m] somewhere fall as fast as in flight, or none of their accelerations is known."""
+    acceleration, sd = local_accelerations(time_s, height_m, variance)
+    is_fast = is_free_fall(acceleration, sd) | (acceleration < -GRAVITY_M_S2)
+    return bool(is_fast.any() or not np.isfinite(acceleration).any())
+
+
 def local_accelerations(time_s: Array, height_m: Array, variance: Array) -> tuple[Array, Array]:
     """Return the acceleration of the best parabola about each time [m/s2] and its sd; NaN near ends and gaps."""
     acceleration, sd = np.full((2, len(time_s)), np.nan)

@@ -12,7 +12,7 @@ from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.fall import UNKNOWN_SD_M, find_wrong_fall, fit_fall, flight_rows
+from airborne.motion.flight.fall import UNKNOWN_SD_M, find_wrong_fall, fit_fall, flight_rows, may_fall
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
@@ -29,7 +29,7 @@ _FEWEST = 12  # frames of a fall, twice the numbers that say how a body turns in
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightSummary:
-    """Summary of all frames with a pose; NaN where there are too few.
+    """Summary of all frames with a pose; NaN where there are too few, and of the fall where the body does not fall.
 
     In free flight the angular momentum is constant and the centre of mass follows a parabola of 9.81 m/s2: departures
     from that check the measurement, or show that the body is not in flight.
@@ -139,7 +139,9 @@ def flight_summary(motion: Motion, table: xr.Dataset) -> FlightSummary:
     momentum, sd = (table[name].to_numpy() for name in ("angular_momentum", "angular_momentum_sd"))
     is_known = np.isfinite(momentum).all(axis=-1)
     momentum, sd = momentum[is_known], sd[is_known & np.isfinite(sd).all(axis=-1)]
-    gravity, gravity_sd, rms = _fit_parabola(motion.time_s[rows], table["com"].to_numpy()[rows], motion.R[rows])
+    time_s, com, com_sd = motion.time_s[rows], *(table[name].to_numpy()[rows] for name in ("com", "com_sd_frame"))
+    has_fall = len(rows) < 2 or may_fall(time_s, com[:, 2], _known_variance(com_sd))
+    gravity, gravity_sd, rms = _fit_parabola(time_s, com, motion.R[rows]) if has_fall else (np.nan,) * 3
     tilt = table["tilt"].to_numpy()[rows]
     return FlightSummary(
         n_poses=len(rows),
@@ -176,8 +178,7 @@ def wrong_flight(motion: Motion, table: xr.Dataset) -> WrongFall | None:
     if len(rows) < 2:
         return None
     com, sd = (table[name].to_numpy()[rows] for name in ("com", "com_sd_frame"))
-    variance = np.where(np.isfinite(sd[:, 2]), sd[:, 2], UNKNOWN_SD_M) ** 2
-    return find_wrong_fall(motion.time_s[rows], com, motion.R[rows], variance)
+    return find_wrong_fall(motion.time_s[rows], com, motion.R[rows], _known_variance(sd))
 
 
 def _whole_sd(motion: Motion, com: Array, variance: Array) -> Array:
@@ -220,6 +221,11 @@ def _fit_parabola(time_s: Array, com: Array, R: Array) -> tuple[float, float, fl
     line = np.vander(t, 2)
     residual = without_gravity - line @ np.linalg.lstsq(line, without_gravity, rcond=None)[0]
     return fall.gravity_m_s2, fall.gravity_sd_m_s2, float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
+
+
+def _known_variance(sd: Array) -> Array:
+    """Return the variances (n,) [m2] of heights whose sds are the last of (n, 3) [m]; a wide one where unknown."""
+    return np.where(np.isfinite(sd[:, 2]), sd[:, 2], UNKNOWN_SD_M) ** 2
 
 
 def _change(values: Array) -> float:

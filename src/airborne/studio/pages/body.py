@@ -98,8 +98,13 @@ def _person_card(table: dict[str, Any], use: Use) -> None:
 
         async def save() -> None:
             stature_m, mass_kg = float(stature.value or 0), float(mass.value or 0)
-            if not (_STATURE_M[0] <= stature_m <= _STATURE_M[1] and _MASS_KG[0] <= mass_kg <= _MASS_KG[1]):
-                complain("give a stature in metres, such as 1.75, and a mass in kilograms, such as 70")
+            if not _STATURE_M[0] <= stature_m <= _STATURE_M[1]:
+                is_cm = _STATURE_M[0] <= stature_m / 100 <= _STATURE_M[1]
+                meant = f"in centimetres? Then give {stature_m / 100:g}" if is_cm else "give it in metres, as 1.75"
+                complain(f"the stature is {stature_m:g} m; {meant}")
+                return
+            if not _MASS_KG[0] <= mass_kg <= _MASS_KG[1]:
+                complain(f"the mass is {mass_kg:g} kg; expected {_MASS_KG[0]:g} to {_MASS_KG[1]:g}; correct it")
                 return
             await use({"preset": "human18", "stature_m": stature_m, "mass_kg": mass_kg})
 
