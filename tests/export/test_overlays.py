@@ -74,6 +74,14 @@ def test_a_label_holds_the_cameras_name_where_it_fits_and_never_hides_the_time(h
     assert not np.array_equal(near, far)
 
 
+@pytest.mark.parametrize("size", [(1280, 720), (1280, 725), (640, 360)])
+def test_a_label_fits_into_an_upright_image_with_its_name(size):
+    image = np.full((*size, 3), SCENE_GREY, np.uint8)
+    draw_label(image, "frame 100   1.667 s   uncertain", "cam01", STATUS_RGB[Status.UNCERTAIN])
+    columns = np.flatnonzero((image != SCENE_GREY).any(axis=(0, 2)))
+    assert columns.max() < size[1] - columns.min()
+
+
 def test_a_lost_frame_has_a_border_and_no_outline(tmp_path):
     ((lost, result), _) = write_videos(tmp_path, [(frames(0), None, Status.LOST), (frames(1), posed(), Status.TRACKED)])
     assert far_from(lost[1, 100:-100], STATUS_RGB[Status.LOST]).mean() < CODED

@@ -12,6 +12,7 @@ from airborne.export.page import format_value, label
 from airborne.export.report import write_report
 from airborne.motion import Motion, flight_summary, landmarks, measure_flight
 from airborne.motion.run_folder import figures_of
+from tests.support.browser import open_file
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
 
 
@@ -52,6 +53,15 @@ def test_headline_numbers_stand_on_the_page(tmp_path):
     html = html_of(tmp_path, run(21, uncertain=(3,), lost=(20,)))
     for words in ("21 frames: 19 tracked, 1 uncertain, 1 lost", "± 2 mm", "± 0.57°", "0.9500 ± 0.0023 turns", "0.4 s"):
         assert words in html
+
+
+def test_the_page_fits_a_telephone(tmp_path):
+    numbers = {f"{name}_rms_mm": 1.2345 for name in ("calibration", "held_out", "another", "measurement")}
+    cameras = [{"name": "cam1", "position_m": [1.4602, -1.9092, 1.8965], **numbers}]
+    html_of(tmp_path, run(), cameras=cameras)
+    with open_file(tmp_path / "report.html") as page:
+        page.set_viewport_size({"width": 390, "height": 844})
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
 
 
 def test_corrections_stand_on_the_page_where_there_are_some(tmp_path):

@@ -35,6 +35,7 @@ OverlaysAs = Literal["videos", "stills"]
 LONGEST_SIDE_PX = 1280  # larger images are reduced to it
 _LINE_SHARE = 1 / 240  # of the image's height
 _TEXT_SHARE = 1 / 30  # of the image's height
+_SMALLER = 0.6  # chosen: of that size, down to which a label shrinks so that it fits
 _MISSING_GREY = 40  # stands in for an image that is missing
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _PRESET, _CRF = "ultrafast", 20  # of the encoder: docs/speed.md has what it costs and saves
@@ -189,18 +190,29 @@ def _draw_border(image: Image, rgb: tuple[int, int, int]) -> None:
 
 
 def draw_label(image: Image, text: str, name: str, rgb: tuple[int, int, int]) -> None:
-    """Write light text on a dark box in the top left corner, before it a square of the status's colour, then a name."""
-    em = max(round(image.shape[0] * _TEXT_SHARE), 10)
+    """Write light text on a dark box in the top left corner, before it a square of the status's colour, then a name.
+
+    Smaller where the name needs it, as in an upright image; one that does not fit then is cut.
+    """
+    whole = max(round(image.shape[0] * _TEXT_SHARE), 10)
+    sizes = range(whole, max(round(_SMALLER * whole), 10) - 1, -1)
+    em = next((em for em in sizes if _place_name(text, name, em)[1] + em // 2 <= image.shape[1]), whole)
     scale, margin = em / 30, em // 2
-    (text_width, text_height), _ = cv2.getTextSize(text, _FONT, scale, 1)
-    name_at = 7 * text_height // 2 + text_width
-    right = margin + name_at + round(width_of(name, size_px=text_height)) + text_height
+    (_, text_height), _ = cv2.getTextSize(text, _FONT, scale, 1)
+    name_at, right = _place_name(text, name, em)
     box = image[margin : margin + 2 * text_height, margin:right]
     box[:] = box // 5
     cv2.rectangle(box, (text_height // 2, text_height // 2), (3 * text_height // 2, 3 * text_height // 2), rgb, -1)
     at = (5 * text_height // 2, 3 * text_height // 2)
     cv2.putText(box, text, at, _FONT, scale, (255, 255, 255), 1, cv2.LINE_AA)
     draw_text(box, name, (name_at, at[1]), size_px=text_height, rgb=(255, 255, 255))
+
+
+def _place_name(text: str, name: str, em: int) -> tuple[int, int]:
+    """Return where a label's name begins in its box, and where the box ends in the image [px]."""
+    (text_width, text_height), _ = cv2.getTextSize(text, _FONT, em / 30, 1)
+    begins = 7 * text_height // 2 + text_width
+    return begins, em // 2 + begins + round(width_of(name, size_px=text_height)) + text_height
 
 
 def line_px(image: Image) -> int:
