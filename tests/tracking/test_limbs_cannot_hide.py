@@ -54,7 +54,8 @@ def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_
     for name, pose in (("true", frame.truth), ("wrong", fold(frame.truth, "thigh_right", FOLDS["thigh_right"]))):
         learned = LearnedRegions(Posteriors(*frame.views(pose)), frame.appearance)
         fit = fitter.fit_images([pose], learned, None)
-        agreement = fitter._assess(fitter._find_faults(fit, learned), learned).agreement  # nothing is mended
+        faults = fitter._find_faults(fit, learned)
+        agreement = fitter._assess(faults, faults.limbs.suspect, learned).agreement  # nothing is mended
         assert agreement.n_views_of is not None
         most[name] = [int(agreement.n_views_of[limb].max()) for limb in limbs_of(HUMAN)]
     assert min(most["true"]) >= 2
