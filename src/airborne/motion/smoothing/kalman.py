@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, minimize_scalar
 
 from airborne.kernels import kernel
+from airborne.kernels.arrays import assign
 from airborne.motion.smoothing.segments import MIN_FRAMES, SmoothedPaths, finite_rows
 from airborne.types import Array
 
@@ -184,7 +185,8 @@ def _filter_kernel(
         if i:
             mean = _predict_mean(F[i - 1], mean)
             P = _predict_covariance(F[i - 1], P, Q[i - 1])
-        before[i], P_before[i] = mean, P
+        assign(before[i], mean)
+        assign(P_before[i], P)
         if is_measured[i]:
             for j in range(k):
                 S, error = 1.0, z[i, j]
@@ -200,7 +202,8 @@ def _filter_kernel(
                         P[a, b] -= Ph[a] * Ph[b] / S
                 squares += error * error / S
                 logs += np.log(S)
-        after[i], P_after[i] = mean, P
+        assign(after[i], mean)
+        assign(P_after[i], P)
     return before, P_before, after, P_after, squares, logs
 
 

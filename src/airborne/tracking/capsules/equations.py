@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.kernels import kernel
+from airborne.kernels.arrays import assign
 from airborne.tracking.capsules.evidence import capsule_evidence
 from airborne.tracking.capsules.jumper import CAPSULES, N_DOF, SURFACE_CLASSES, border_shares, pose_capsules
 from airborne.tracking.capsules.kernel_arguments import Capsules
@@ -48,7 +49,8 @@ def accumulate_equations(state, n_free, images, owned, equations):
     sums, contrast = images.maps.sums, images.maps.contrast
     n, all_n, n_views = N_CAPSULES, N_CAPSULES + len(others.ends), len(cameras)
     ends, end_radii, share = np.empty((all_n, 2, 3)), np.empty((all_n, 2)), np.ones(all_n)
-    ends[n:], end_radii[n:] = others.ends, others.radii
+    assign(ends[n:], others.ends)
+    assign(end_radii[n:], others.radii)
     discs, depth = np.empty((all_n, 2, 3)), np.empty(all_n)
     m = n if n_free > 0 else 0
     g, H = np.empty((m, 7)), np.empty((m, 7, 7))
@@ -71,12 +73,12 @@ def accumulate_equations(state, n_free, images, owned, equations):
         _differentiate(state, points, ends, end_radii, share, jacobian, capsule_jacobian)
         curved, state_offset = np.empty((n, _N_PARAMETERS, n_free)), np.empty((n, 2 * n_views, n_free))
         for i in range(n):
-            curved[i] = capsule_curvature[i] @ capsule_jacobian[i]
-            state_offset[i] = offset_gradient[i] @ capsule_jacobian[i]
+            assign(curved[i], capsule_curvature[i] @ capsule_jacobian[i])
+            assign(state_offset[i], offset_gradient[i] @ capsule_jacobian[i])
         flat, flat_offset = capsule_jacobian.reshape(-1, n_free), state_offset.reshape(-1, n_free)
-        gradient[:] = capsule_gradient.reshape(-1) @ flat
-        curvature[:] = flat.T @ curved.reshape(-1, n_free)
-        score_covariance[:] = flat_offset.T @ flat_offset
+        assign(gradient, capsule_gradient.reshape(-1) @ flat)
+        assign(curvature, flat.T @ curved.reshape(-1, n_free))
+        assign(score_covariance, flat_offset.T @ flat_offset)
     return total
 
 

@@ -66,7 +66,9 @@ def capsule_evidence(discs, depth, classes, share, sums, contrast, origin, work,
     n, (_, h, w) = len(discs), sums.shape
     n_moving = len(gradient)
     order = np.argsort(depth)
-    out[:], gradient[:], curvature[:] = 0, 0, 0
+    out.fill(0)
+    gradient.fill(0)
+    curvature.fill(0)
     first, last = np.zeros(n, np.int64), np.zeros(n, np.int64)
     top, bottom = h, 0
     x, pieces, tangents = work.x, work.pieces, work.tangents

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airborne.kernels import kernel
+from airborne.kernels.arrays import add, assign
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, accumulate_equations, classes_with
 from airborne.tracking.capsules.jumper import FOOT_HEIGHT_M, LIMITS_RAD, N_DOF
 from airborne.tracking.capsules.kernel_arguments import Capsules, Equations, Images, SummedMaps, Workspace
@@ -164,8 +165,8 @@ def _maximise(best, trial, priors, images, weight, most_steps):
         for k in range(n):
             damped[k, k] += damping * damped[k, k]
         step = np.linalg.solve(damped, best.gradient)
-        trial.state[:] = best.state
-        trial.state[:n] += step
+        assign(trial.state, best.state)
+        add(trial.state[:n], step)
         _evaluate(trial, priors, images, weight)
         gain = trial.totals[1] - best.totals[1]
         if gain > 0:
@@ -189,10 +190,10 @@ def _evaluate(iterate, priors, images, weight):
     prior_gradient = priors.information @ deviation
     posture_deviation = _REST_POSE - state[:N_DOF]
     posture_gradient = priors.posture @ posture_deviation
-    A[:] = weight * _SLOPE * iterate.equations.curvature + priors.information
-    b[:] = weight * iterate.equations.gradient - prior_gradient
-    A[:N_DOF, :N_DOF] += priors.posture
-    b[:N_DOF] += posture_gradient
+    assign(A, weight * _SLOPE * iterate.equations.curvature + priors.information)
+    assign(b, weight * iterate.equations.gradient - prior_gradient)
+    add(A[:N_DOF, :N_DOF], priors.posture)
+    add(b[:N_DOF], posture_gradient)
     cost = 0.5 * (deviation @ prior_gradient + posture_deviation @ posture_gradient)
     for k in range(N_DOF):
         beyond = min(max(state[k], LIMITS_RAD[k, 0]), LIMITS_RAD[k, 1]) - state[k]

@@ -114,7 +114,7 @@ def merge_span(taken_x, taken_by, taken, a, b, owner):
     left_by, right_by, n = owner, owner, 0
     for k in range(taken):
         if taken_x[k, 1] < a or taken_x[k, 0] > b:
-            taken_x[n], taken_by[n] = taken_x[k], taken_by[k]
+            _copy_span(taken_x, taken_by, n, k)
             n += 1
             continue
         if taken_x[k, 0] <= a:
@@ -125,7 +125,13 @@ def merge_span(taken_x, taken_by, taken, a, b, owner):
         return n
     k = n
     while k > 0 and taken_x[k - 1, 0] > a:
-        taken_x[k], taken_by[k] = taken_x[k - 1], taken_by[k - 1]
+        _copy_span(taken_x, taken_by, k, k - 1)
         k -= 1
     taken_x[k, 0], taken_x[k, 1], taken_by[k, 0], taken_by[k, 1] = a, b, left_by, right_by
     return n + 1
+
+
+@kernel(inline="always")
+def _copy_span(taken_x, taken_by, to, k):
+    for end in range(2):
+        taken_x[to, end], taken_by[to, end] = taken_x[k, end], taken_by[k, end]

@@ -197,8 +197,10 @@ def _add_areas(states, camera, colours, classes, areas):
             continue
         pose_state(states[i], points, ends, radii, share)
         project_capsules(ends, radii, camera, discs, depth)
-        discs[:, :, 0] -= x0
-        discs[:, :, 1] -= y0
+        for k in range(N_CAPSULES):
+            for end in range(2):
+                discs[k, end, 0] -= x0
+                discs[k, end, 1] -= y0
         labels = np.empty((y1 - y0, x1 - x0), np.int8)
         draw_labels(discs, depth, classes, share, labels)
         for row in range(y1 - y0):
