@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Sequence
+from decimal import Decimal
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -79,6 +81,11 @@ def count(n: int, noun: str) -> str:
 def count_of(n: int, total: int, noun: str) -> str:
     """Return a part of a number with its noun and verb, as 1 of 3 frames is, 2 of 3 frames are."""
     return f"{n} of {count(total, noun)} {'is' if n == 1 else 'are'}"
+
+
+def format_digits(value: float, digits: int) -> str:
+    """Return a number with so many digits that count, as 150 or 0.034 with two: never as a power of ten."""
+    return format(Decimal(f"{value:.{digits}g}"), "f") if math.isfinite(value) else str(value)
 
 
 def require_choice(value: str, choices: Collection[str], what: str) -> None:

@@ -13,7 +13,7 @@ import typer
 
 from airborne.cli.console import Json, Out, progress, stop
 from airborne.cli.results import evaluate_command
-from airborne.errors import AirborneError, count
+from airborne.errors import AirborneError, count, format_digits
 from airborne.io.terminal import Stages
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ def _describe(summary: dict, output: Path) -> str:
 
 
 def _describe_sd(sd: float, unit: str) -> str:
-    return f"{float(f'{sd:.2g}'):g} {unit}" if math.isfinite(sd) else "not visible in the images"
+    return f"{format_digits(sd, 2)} {unit}" if math.isfinite(sd) else "not visible in the images"
 
 
 def fit_body_command(

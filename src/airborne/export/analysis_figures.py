@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from airborne.errors import format_digits
 from airborne.evaluation import Agreement, Series
 from airborne.evaluation.compare import or_dash
 from airborne.export import panels
@@ -37,7 +38,7 @@ def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | Non
     axes.plot(f, residual, color=panels.LINE, label="residual, all joints and axes")
     if np.isfinite(start):
         axes.plot(f, np.maximum(start + slope * f, 0), "--", color=_OTHER, linewidth=1, label="line of noise alone")
-        axes.axhline(start, color=_OTHER, linewidth=0.6, label=f"RMS of the noise: {start:.2g} mm")
+        axes.axhline(start, color=_OTHER, linewidth=0.6, label=f"RMS of the noise: {format_digits(start, 2)} mm")
         axes.set_ylim(0, max(4 * start, 1.2 * float(np.interp(f[-1] / 6, f, residual))))
     for hz, colour, style, label in (
         (analysis.chosen_hz, _CHOSEN, "-", "Winter"),

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airborne.errors import ResultError
+from airborne.errors import ResultError, format_digits
 from airborne.export.methods_text import SURFACES
 from airborne.export.page import UNKNOWN_TEXT, HtmlTable, format_with_sd, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
@@ -187,7 +187,7 @@ def _median_sd(head: Mapping[str, Any], what: str, unit: str) -> str:
     value = head[f"median_{what}_sd_{unit}"]
     if value is None:
         return "cannot be seen" if head[f"n_{what}_unobservable"] else UNKNOWN_TEXT
-    return f"± {value:.2g} mm" if unit == "mm" else f"± {value:.2g}°"
+    return f"± {format_digits(value, 2)}{' mm' if unit == 'mm' else '°'}"
 
 
 def _with_unit(value: float | None, form: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airborne.body import BodyModel, Pose
-from airborne.errors import ResultError, count
+from airborne.errors import ResultError, count, format_digits
 from airborne.motion.rows import read_rows
 from airborne.motion.run_folder import MOTION
 from airborne.run.track import track_trial
@@ -51,8 +51,8 @@ def fit_to_frame(session: Session, model: BodyModel, frame: int, pose: Pose) -> 
 
 def describe_quality(fit: FirstPoseFit) -> str:
     """Say how well a pose fits: how far edges lie off its outline, in how many cameras, and how sure its place is."""
-    x, y, z = 1e3 * fit.place_sd_m
-    says = f"Place ± {x:.0f}, {y:.0f}, {z:.0f} mm (sd of x, y, z)."
+    sds_mm = ", ".join(format_digits(each, 2) for each in (1e3 * fit.place_sd_m).tolist())
+    says = f"Place ± {sds_mm} mm (sd of x, y, z)."
     if not fit.shifts:
         return f"No camera shows enough of the body to tell how well it fits; look at the outlines. {says}"
     far_px = float(np.mean([each.far_px for each in fit.shifts]))

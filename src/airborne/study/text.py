@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airborne import __version__
-from airborne.errors import count
+from airborne.errors import count, format_digits
 from airborne.study.comparison import ALPHA, Contrast, VariableComparison
 from airborne.study.spm import NOT_TESTED, format_p
 
@@ -112,17 +112,17 @@ def _results(comparison: VariableComparison) -> list[str]:
         _number(each, comparison) if comparison.axis is None else _curve(each, comparison)
         for each in comparison.contrasts
     ]
-    typical = (float(np.median(each)) for each in (spread.sd_within, spread.sd_measurement, spread.mdc))
-    within, measured, mdc = typical
+    typical = [float(np.median(each)) for each in (spread.sd_within, spread.sd_measurement, spread.mdc)]
+    within, measured, mdc = (format_digits(each, 3) for each in typical)
     over = "" if comparison.axis is None else ", median over the curve,"
     stated = "the runs state none for the measurement"
-    if measured:
-        stated = f"the runs state {measured:.3g} for the measurement, errors included that trials share"
-    if np.isnan(within):
-        return [*sentences, f"{_NOT_REPEATED} ({stated}{over.removesuffix(',') if measured else ''})."]
+    if typical[1]:
+        stated = f"the runs state {measured} for the measurement, errors included that trials share"
+    if np.isnan(typical[0]):
+        return [*sentences, f"{_NOT_REPEATED} ({stated}{over.removesuffix(',') if typical[1] else ''})."]
     sentences.append(
-        f"standard deviation between trials of one athlete and condition{over} {within:.3g} ({stated}); "
-        f"minimal detectable change of a trial {mdc:.3g}."
+        f"standard deviation between trials of one athlete and condition{over} {within} ({stated}); "
+        f"minimal detectable change of a trial {mdc}."
     )
     return sentences
 
@@ -130,12 +130,10 @@ def _results(comparison: VariableComparison) -> list[str]:
 def _number(contrast: Contrast, comparison: VariableComparison) -> str:
     difference, level, p = contrast.difference, _describe_level(contrast, comparison), contrast.p_holm
     assert p is not None, "a number has one"
+    value, low, high = (format_digits(each[0], 4) for each in (difference.value, difference.low, difference.high))
     if not np.isfinite(p):
-        return f"{contrast.b} minus {contrast.a} is {difference.value[0]:.4g} and {NOT_TESTED}; {level}."
-    return (
-        f"{contrast.b} minus {contrast.a} {difference.value[0]:.4g}, 95 % interval {difference.low[0]:.4g} to "
-        f"{difference.high[0]:.4g}, {format_p(p)}; {level}."
-    )
+        return f"{contrast.b} minus {contrast.a} is {value} and {NOT_TESTED}; {level}."
+    return f"{contrast.b} minus {contrast.a} {value}, 95 % interval {low} to {high}, {format_p(p)}; {level}."
 
 
 def _curve(contrast: Contrast, comparison: VariableComparison) -> str:
@@ -144,15 +142,16 @@ def _curve(contrast: Contrast, comparison: VariableComparison) -> str:
     level = _describe_level(contrast, comparison)
     if not np.isfinite(test.threshold):
         return f"{contrast.b} minus {contrast.a} {NOT_TESTED}; {level}."
+    threshold = format_digits(test.threshold, 3)
     if not test.clusters:
-        return f"{contrast.b} and {contrast.a} do not differ anywhere, |t| below {test.threshold:.3g}; {level}."
-    nodes = np.arange(len(axis))
-    spans = [
-        f"from {np.interp(low, nodes, axis):.3g} to {np.interp(high, nodes, axis):.3g} ({format_p(p)})"
-        for low, high, p in test.clusters
-    ]
+        return f"{contrast.b} and {contrast.a} do not differ anywhere, |t| below {threshold}; {level}."
+
+    def at(node: float) -> str:
+        return format_digits(float(np.interp(node, np.arange(len(axis)), axis)), 3)
+
+    spans = [f"from {at(low)} to {at(high)} ({format_p(p)})" for low, high, p in test.clusters]
     return (
-        f"{contrast.b} and {contrast.a} differ, |t| above {test.threshold:.3g}, {', '.join(spans)} of "
+        f"{contrast.b} and {contrast.a} differ, |t| above {threshold}, {', '.join(spans)} of "
         f"{comparison.axis_label}; {level}."
     )
 

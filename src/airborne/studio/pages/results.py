@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.errors import ResultError, count
+from airborne.errors import ResultError, count, format_digits
 from airborne.export.methods_text import describe_corrections, describe_methods
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
@@ -86,7 +86,7 @@ def _numbers(summary: dict[str, Any]) -> None:
                 with ui.element("tr"):
                     for tag, text in (
                         ("th", words),
-                        ("td", f"{value:.3g}" if isinstance(value, float) else str(value)),
+                        ("td", format_digits(value, 3) if isinstance(value, float) else str(value)),
                     ):
                         with ui.element(tag):
                             ui.label(text)

@@ -12,6 +12,7 @@ import numpy as np
 from nicegui import ui
 from nicegui.elements.scene.scene import Scene
 
+from airborne.errors import format_digits
 from airborne.motion.run_folder import SUMMARY, holds_players, read_summary
 from airborne.studio.curve_data import Momenta, curve_kinds, describe_distance, run_momenta
 from airborne.studio.disagreement import look_for_disagreement
@@ -240,4 +241,5 @@ class MomentumArrow:
         com_m, L, sd = self._momenta.at(frame) or (np.zeros(3), np.zeros(3), 0.0)
         self._arrow.show(com_m, L / self._momenta.greatest * _LONGEST_M)
         size = float(np.linalg.norm(L))
-        self._says.set_text(f"arrow: angular momentum {size:.3g} ± {sd:.3g} kg m²/s" if size else "")
+        text = f"arrow: angular momentum {format_digits(size, 3)} ± {format_digits(sd, 3)} kg m²/s"
+        self._says.set_text(text if size else "")
