@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import SimpleNamespace
@@ -49,6 +50,7 @@ class ForkedCommand:
 
 def fork_commands() -> None:
     """Let the commands of this process's studio be forks, but for those whose code a test has replaced."""
+    forkserver._forkserver.ensure_running = lambda: None  # it runs; Python starts each fork another, which imports all
     commands.subprocess = SimpleNamespace(**vars(subprocess) | {"Popen": _start})
 
 
