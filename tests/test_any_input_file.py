@@ -1,4 +1,4 @@
-"""Over a thousand random and mutated files: every reader of the package says what is wrong in one line, or reads them."""
+"""Over a thousand random and mutated files: every reader says what is wrong in one line, or reads them."""
 
 import json
 import os
