@@ -16,8 +16,8 @@ def grown(found, name):
 
 
 def test_trial_after_trial_leaves_nothing_open(tmp_path):
-    found = soak_trials(tmp_path, 25)
-    assert found["trials"] == 25
+    found = soak_trials(tmp_path, 12)
+    assert found["trials"] == 12
     assert grown(found, "descriptors") <= 0 and grown(found, "threads") <= 0
 
 

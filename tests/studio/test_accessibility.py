@@ -18,15 +18,22 @@ SIZES = ((1024, 700), (3840, 2160))  # of the window, the smallest and the large
 HAS_GROWN = """height => [...document.querySelectorAll(".q-layout, .q-page")].every(
     (each) => parseFloat(each.style.minHeight) === height
 )"""  # Quasar gives these the height of the window, a moment after it has it: on a busy machine a later one
+IS_STILL = """!document.querySelector(".q-notification") && // those, and the bar of what is loaded, fade in and out
+    [...document.querySelectorAll(".q-loading-bar")].every((each) => each.style.opacity === "0")"""
+END_ANIMATIONS = """Promise.allSettled(document.getAnimations().map(
+    async (each) => each.effect.getComputedTiming().endTime < Infinity ? each.finish() : each.finished
+))"""
+ARE_LOADED = "[...document.querySelectorAll('[role=dialog] img')].every((each) => each.naturalWidth)"
 PAGES = {  # and what is there when a page is built
     "": "Use these cameras", "sync": "Same event", "cameras": "focal length", "body": "Use this person",
     "ruler": "How long", "thing": "Use this thing", "start": "Place it by hand", "track": "Track again",
     "review": "Next uncertain", "digitise": "Agreement", "results": "Export",
 }  # fmt: skip
-DIALOGS = {  # the page, the button that opens it, and what is in it
-    "keys": ("cameras", "Keys", "this sheet"), "example": ("cameras", "An example", "the thrown cross"),
-    "calibration": ("cameras", "With a board or a wand", "Calibrate with the wand"),
-    "comparison": ("digitise", "Compare", "matched"), "agreement": ("digitise", "Agreement", "95 % limits"),
+DIALOGS = {  # of a page: the button that opens each, and what is in it
+    "cameras": {
+        "Keys": "this sheet", "An example": "the thrown cross", "With a board or a wand": "Calibrate with the wand",
+    },
+    "digitise": {"Compare": "matched", "Agreement": "95 % limits"},
 }  # fmt: skip
 TRIAL = f"""name = "person"
 calibration = {{ file = "calib.toml" }}
@@ -63,22 +70,21 @@ def found(folder):
     axe, found = _axe(), {}
 
     def look(page, name):
-        page.wait_for_function("!document.querySelector('.q-notification')")  # those fade in and out
-        page.evaluate("Promise.allSettled(document.getAnimations().map((each) => each.finished))")
+        page.wait_for_function(IS_STILL)
+        page.evaluate(END_ANIMATIONS)
         found[name] = (None if axe is None else violations(axe, page)), faults_by_size(page)
 
     with fork_studio(folder) as address, open_page(address) as page:
         for name, text in PAGES.items():
             go(page, address, name, text)
             look(page, name)
-        for name, (where, button, text) in DIALOGS.items():
-            go(page, address, where, PAGES[where])
-            page.get_by_role("button", name=button).first.click()
-            page.get_by_role("dialog").get_by_text(text).first.wait_for()
-            look(page, name)
-            assert page.evaluate(
-                "[...document.querySelectorAll('[role=dialog] img')].every((each) => each.naturalWidth)"
-            )
+            for button, inside in DIALOGS.get(name, {}).items():
+                page.get_by_role("button", name=button).first.click()
+                page.get_by_role("dialog").get_by_text(inside).first.wait_for()
+                look(page, button)
+                assert page.evaluate(ARE_LOADED)
+                page.keyboard.press("Escape")
+                page.get_by_role("dialog").wait_for(state="detached")
         (folder / "trial.toml").write_text(TRIAL.replace(PERSON_TABLE, 'body = { preset = "legs" }'))
         go(page, address, "start", "another player's name")
         look(page, "start, of players")

@@ -1,5 +1,7 @@
 """Players clicked in a real browser, one after the other, and a length measured: both are in the trial's folder."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,6 @@ from tests.support.browser import open_page
 from tests.support.clips import write_clip
 from tests.support.studio import User, fork_studio, wait_for_frame
 
-SIZE = (640, 480)
 LEGS = {
     "torso": [0.0, 0.0, 1.2], "hip_left": [0.1, 0.0, 0.95], "hip_right": [-0.1, 0.0, 0.95],
     "knee_left": [0.12, 0.02, 0.5], "knee_right": [-0.12, 0.02, 0.5],
@@ -24,23 +25,32 @@ calibration = { file = "calib.toml" }
 """
 
 
+def two_cameras(width=640):
+    """Return cameras whose pictures have a width, and three quarters of it as their height [px]."""
+    places, size = {"a": [3.0, -4.0, 1.5], "b": [-4.0, -3.0, 1.2]}, (width, 3 * width // 4)
+    look = partial(camera_looking_at, target=[0.2, 0, 0.8], focal_px=width * 15 / 16, size=size)
+    return Rig(tuple(look(name, place) for name, place in places.items()))
+
+
+def write_block(folder, rig, n=4):
+    """Write a trial without a body, whose videos show nothing, and return its folder."""
+    folder.mkdir()
+    for camera in rig:
+        grey = [np.full((camera.size[1], camera.size[0], 3), 110, np.uint8)] * n
+        write_clip(folder / f"{camera.name}.mp4", grey, codec="libx264", pix_fmt="yuv420p")
+    write_pose2sim(folder / "calib.toml", rig)
+    (folder / "trial.toml").write_text(TRIAL)
+    return folder
+
+
 @pytest.fixture(scope="module")
 def rig():
-    places = {"a": [3.0, -4.0, 1.5], "b": [-4.0, -3.0, 1.2]}
-    return Rig(tuple(camera_looking_at(n, p, [0.2, 0, 0.8], focal_px=600, size=SIZE) for n, p in places.items()))
+    return two_cameras()
 
 
 @pytest.fixture(scope="module")
 def folder(rig, tmp_path_factory):
-    """A trial without a body, whose videos show nothing."""
-    folder = tmp_path_factory.mktemp("studio") / "block"
-    folder.mkdir()
-    grey = [np.full((SIZE[1], SIZE[0], 3), 110, np.uint8)] * 4
-    for name in rig.names:
-        write_clip(folder / f"{name}.mp4", grey, codec="libx264", pix_fmt="yuv420p")
-    write_pose2sim(folder / "calib.toml", rig)
-    (folder / "trial.toml").write_text(TRIAL)
-    return folder
+    return write_block(tmp_path_factory.mktemp("studio") / "block", rig)
 
 
 def click_everywhere(user, rig, name, point):

@@ -7,8 +7,10 @@ from fractions import Fraction
 from airborne.cameras import Rig, camera_looking_at
 from airborne.io.folder_lock import LOCK
 from airborne.motion.run_folder import SUMMARY
+from airborne.studio import commands
 from airborne.studio.commands import Command
 from airborne.studio.session import Session
+from tests.support.forked_commands import FORKED
 from tests.support.person_run import write_person_run
 
 _WRITES = """
@@ -21,19 +23,20 @@ with sole_writer(pathlib.Path(sys.argv[1])):
 """
 
 
-def test_two_commands_of_one_kind_say_each_its_own(tmp_path):
-    commands = [Command(["export", name, "--c3d"], tmp_path) for name in ("no_run", "no_other")]
-    for command in commands:
+def test_two_commands_of_one_kind_say_each_its_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(commands, "subprocess", FORKED)
+    exports = [Command(["export", name, "--c3d"], tmp_path) for name in ("no_run", "no_other")]
+    for command in exports:
         assert command.output() == ""
         command._process.wait()
-    assert ["no_run" in each.complaint() for each in commands] == [True, False]
-    assert "no_other" in commands[1].complaint()
-    commands[0]._log.write_text("airborne: compiling\ntracking cross: a throw: 3 of 34\n")
-    assert (commands[0].how_far(), commands[0].n_done()) == ("3 of 34", 3)
-    commands[0]._log.write_text("looking for the start: 30 of 34\n")
-    assert (commands[0].how_far(), commands[0].n_done()) == ("30 of 34", 0)  # none of these is tracked
-    commands[0]._log.write_text("airborne: compiling: up to a minute\n")
-    assert (commands[0].how_far(), commands[0].n_done()) == ("compiling: up to a minute", 0)
+    assert ["no_run" in each.complaint() for each in exports] == [True, False]
+    assert "no_other" in exports[1].complaint()
+    exports[0]._log.write_text("airborne: compiling\ntracking cross: a throw: 3 of 34\n")
+    assert (exports[0].how_far(), exports[0].n_done()) == ("3 of 34", 3)
+    exports[0]._log.write_text("looking for the start: 30 of 34\n")
+    assert (exports[0].how_far(), exports[0].n_done()) == ("30 of 34", 0)  # none of these is tracked
+    exports[0]._log.write_text("airborne: compiling: up to a minute\n")
+    assert (exports[0].how_far(), exports[0].n_done()) == ("compiling: up to a minute", 0)
 
 
 def test_a_command_says_from_the_first_moment_what_it_does_and_how_far_it_is(tmp_path):

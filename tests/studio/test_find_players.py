@@ -8,7 +8,7 @@ from airborne.run.players_tracker import player_starts
 from airborne.studio.outlines import legs_items
 from airborne.studio.trial_edits import with_players
 from airborne.trial.file import read_trial
-from tests.studio.test_click_players import LEGS, TRIAL, folder, rig  # noqa: F401
+from tests.studio.test_click_players import LEGS, TRIAL, folder, rig, two_cameras, write_block  # noqa: F401
 from tests.support.browser import open_page
 from tests.support.studio import User, fork_studio, wait_for_frame
 
@@ -32,9 +32,10 @@ def test_legs_are_lines_down_each_side_in_every_camera(rig):  # noqa: F811
     np.testing.assert_allclose(items[0]["points"], next(iter(rig)).px_from_world(np.array(left)), atol=0.006)
 
 
-def test_where_nobody_stands_the_studio_says_so_and_clicks_are_a_button_away(rig, folder):  # noqa: F811
-    (folder / "trial.toml").write_text(TRIAL + 'body = { preset = "legs" }\n')
-    with fork_studio(folder) as address, open_page(address.replace("/?", "/start?")) as page:
+def test_where_nobody_stands_the_studio_says_so_and_clicks_are_a_button_away(tmp_path):
+    block = write_block(tmp_path / "block", two_cameras(160), 1)  # large pictures take long to be looked through
+    (block / "trial.toml").write_text(TRIAL + 'body = { preset = "legs" }\n')
+    with fork_studio(block) as address, open_page(address.replace("/?", "/start?")) as page:
         user = User(page)
         wait_for_frame(page, 0)
         user.press("Find automatically")

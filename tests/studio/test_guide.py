@@ -3,7 +3,7 @@
 from airborne.studio.guide import next_task
 from airborne.studio.project import find_trial, read_project, steps
 from tests.support.browser import open_page
-from tests.support.studio import fork_studio
+from tests.support.studio import open_studio
 
 
 def test_the_walk_goes_from_step_to_step(tmp_path):
@@ -20,7 +20,8 @@ def test_the_walk_goes_from_step_to_step(tmp_path):
 
 
 def test_the_demo_walks_through_a_copy_of_the_example(tmp_path):
-    with fork_studio(tmp_path / "any", "--demo") as address, open_page(address) as page:
+    """In the process that a user starts, not in a fork of one."""
+    with open_studio(tmp_path / "any", "--demo") as address, open_page(address) as page:
         page.get_by_text("Three cameras filmed a wooden cross that was thrown.").wait_for()
         page.get_by_role("button", name="Use these cameras").click()
         page.get_by_role("link", name="Next: Cameras").click()

@@ -5,17 +5,15 @@ import random
 import threading
 import time
 
-import pytest
-
 from airborne.io.text import read_json
 from airborne.studio.drafts import DRAFTS
 from airborne.studio.things import parse_thing
-from tests.support.browser import open_page
+from tests.support.browser import open_blank
 from tests.support.example_trial import copy_cross
 from tests.support.studio import at_pixel, fork_studio, kill_studio
 
 OLD_S, BUSY_S = 2.0, (0.3, 1.5)  # what may be lost; how much longer someone works until the studio is killed
-PATIENCE_MS = 5000  # with a studio that may be killed
+PATIENCE_MS = 2000  # with a studio that may be killed
 AGAIN_MS = 8000  # after which a click is lost
 STEP_PX, PANE = 12.0, 0  # of each drag, to the right in this camera's picture
 READY = "document.querySelector('canvas.view')?.dataset.frame !== undefined"
@@ -31,43 +29,47 @@ STILL = """() => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """The thrown cross."""
-    return copy_cross(tmp_path_factory.mktemp("studio") / "cross")
-
-
 @contextlib.contextmanager
-def open_window(folder, path):
-    """Open a page of the studio in a window whose complaints about a lost server do not count."""
-    with fork_studio(folder) as address, open_page(address) as first:
-        window = first.context.new_page()
-        window.goto(f"http://{address.split('/')[2]}{path}")
-        first.goto("about:blank")
-        window.wait_for_function(READY)
-        yield window
+def open_windows(folder, paths):
+    """Open pages of the studio, each in a window whose complaints about a lost server do not count."""
+    with fork_studio(folder) as address, open_blank(address) as blank:
+        server, token = address.split("/")[2], address.partition("?")[2]
+        windows = [blank.context.new_page() for _ in paths]
+        for window, path in zip(windows, paths, strict=True):
+            window.goto(f"http://{server}{path}?{token}")
+            window.wait_for_function(READY)
+        yield windows
 
 
-def work_until_killed(folder, window, do):
-    """Do things, each given its number, until the studio is killed; return how many were done two seconds before."""
+def work_until_killed(folder, windows, edits):
+    """Do each window's edit in turn, given its number, until the studio is killed.
+
+    Return how many of each were done two seconds before.
+    """
     from playwright.sync_api import Error
 
-    do(window, 1)
-    done_s, killed_s = [time.monotonic()], []
+    done_s, killed_s = [[] for _ in windows], []
+
+    def edit_all():
+        for window, edit, at_s in zip(windows, edits, done_s, strict=True):
+            window.bring_to_front()
+            edit(window, len(at_s) + 1)
+            at_s.append(time.monotonic())
 
     def kill():
         kill_studio(folder)
         killed_s.append(time.monotonic())
 
-    timer = threading.Timer(OLD_S + random.Random(len(window.url)).uniform(*BUSY_S), kill)
+    edit_all()
+    timer = threading.Timer(OLD_S + random.Random(7).uniform(*BUSY_S), kill)
     timer.start()
-    window.set_default_timeout(PATIENCE_MS)
+    for window in windows:
+        window.set_default_timeout(PATIENCE_MS)
     with contextlib.suppress(Error):
         while not killed_s:
-            do(window, len(done_s) + 1)
-            done_s.append(time.monotonic())
+            edit_all()
     timer.join()
-    return sum(at_s < killed_s[0] - OLD_S for at_s in done_s)
+    return [sum(each < killed_s[0] - OLD_S for each in at_s) for at_s in done_s]
 
 
 def add_point(window, name, timeout_ms=None):
@@ -89,16 +91,6 @@ def add_and_click(window, number):
     window.locator(".point", has_text=name).get_by_text("•").wait_for()
 
 
-def test_points_named_and_clicked_are_there(folder):
-    with open_window(folder, "/digitise") as window:
-        old = work_until_killed(folder, window, add_and_click)
-    with open_window(folder, "/digitise") as window:
-        window.locator(".point", has_text=f"clicked{old}").first.wait_for()
-        for number in range(1, old + 1):
-            assert window.locator(".point", has_text=f"named{number}").count() >= 1
-            window.locator(".point", has_text=f"clicked{number}").first.get_by_text("•").wait_for()
-
-
 def drag_on(window, number):
     """Drag the body to the right."""
     u, v = window.evaluate(OUTLINE, PANE)[2:]
@@ -109,32 +101,9 @@ def drag_on(window, number):
     window.wait_for_function(STILL)
 
 
-def test_a_pose_that_is_dragged_is_there(folder):
-    with open_window(folder, "/start") as window:
-        window.get_by_role("button", name="Place it by hand").click()
-        window.get_by_text("The pose was set by hand. Not yet used").wait_for()
-        window.wait_for_function(OUTLINE, arg=PANE)
-        before = window.evaluate(OUTLINE, PANE)[0]
-        old = work_until_killed(folder, window, drag_on)
-    with open_window(folder, "/start") as window:
-        window.get_by_text("The outline is the pose that was made here last. Not yet used").wait_for()
-        window.wait_for_function(OUTLINE, arg=PANE)
-        assert window.evaluate(OUTLINE, PANE)[0] > before + STEP_PX * (old - 0.5)
-
-
 def lengthen(window, number):
-    """Make a thing longer, and say that two pictures show the same."""
+    """Make a thing longer."""
     window.get_by_label("lengths [mm] y").fill(f"{100 + number}")
-    window.wait_for_timeout(500)
-
-
-def test_a_thing_that_is_described_is_there(folder):
-    with open_window(folder, "/thing") as window:
-        old = work_until_killed(folder, window, lengthen)
-    text = read_json(folder / DRAFTS)["trial.toml"]["thing"]["text"]
-    assert parse_thing(text, "thing.toml")[1][0].size_mm[1] >= 100 + old
-    with open_window(folder, "/thing") as window:
-        assert float(window.get_by_label("lengths [mm] y").input_value()) >= 100 + old
 
 
 def add_event(window, number):
@@ -143,9 +112,32 @@ def add_event(window, number):
     window.get_by_text(f"{number} event").wait_for()
 
 
-def test_events_of_two_cameras_are_there(folder):
-    with open_window(folder, "/sync") as window:
-        old = work_until_killed(folder, window, add_event)
-    with open_window(folder, "/sync") as window:
-        said = window.get_by_text("event").filter(has_text="±").first.text_content()
-        assert int(said.split()[0]) >= old
+def middle(window):
+    """Return how far right the middle of the outline is, once it is drawn [px]."""
+    window.wait_for_function(OUTLINE, arg=PANE)
+    return window.evaluate(OUTLINE, PANE)[0]
+
+
+def place_by_hand(window):
+    window.get_by_role("button", name="Place it by hand").click()
+    window.get_by_text("The pose was set by hand. Not yet used").wait_for()
+
+
+def test_points_a_pose_a_thing_and_events_are_there_again(tmp_path):
+    folder = copy_cross(tmp_path / "cross")
+    edits = {"/digitise": add_and_click, "/start": drag_on, "/thing": lengthen, "/sync": add_event}
+    with open_windows(folder, edits) as windows:
+        place_by_hand(windows[1])
+        before = middle(windows[1])
+        clicked, dragged, lengthened, events = work_until_killed(folder, windows, edits.values())
+    text = read_json(folder / DRAFTS)["trial.toml"]["thing"]["text"]
+    assert parse_thing(text, "thing.toml")[1][0].size_mm[1] >= 100 + lengthened
+    with open_windows(folder, edits) as (digitise, start, thing, sync):
+        for number in range(1, clicked + 1):
+            assert digitise.locator(".point", has_text=f"named{number}").count() >= 1
+            digitise.locator(".point", has_text=f"clicked{number}").first.get_by_text("•").wait_for()
+        start.get_by_text("The outline is the pose that was made here last. Not yet used").wait_for()
+        assert middle(start) > before + STEP_PX * (dragged - 0.5)
+        assert float(thing.get_by_label("lengths [mm] y").input_value()) >= 100 + lengthened
+        said = sync.get_by_text("event").filter(has_text="±").first.text_content()
+        assert int(said.split()[0]) >= events

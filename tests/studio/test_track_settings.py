@@ -64,27 +64,21 @@ def test_a_run_is_kept_unless_it_is_to_be_replaced_and_a_name_is_refused_not_alt
     assert (trial.parent / "results" / "joints.csv").read_bytes() == before
 
 
-def test_a_page_goes_on_once_what_comes_first_is_done(tmp_path):
+def test_a_page_goes_on_once_what_comes_first_is_done_and_frames_before_the_first_pose_are_taken_back(tmp_path):
     folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
+    trial = edit_trial(folder / "trial.toml", "trial.toml", ("frame = 0", "frame = 20"))
     points = folder / "control_points.csv"
     text = points.read_text()
     points.write_text(text.replace("5", "five", 1))
-    with fork_studio(folder / "trial.toml") as address, open_page(address.replace("/?", "/track?")) as page:
+    with fork_studio(trial) as address, open_page(address.replace("/?", "/track?")) as page:
         page.get_by_text("First comes Cameras: see the steps at the left.").wait_for()
         assert "is not a number" in page.locator(".rail .says").nth(1).get_attribute("title")
         points.write_text(text)
         page.get_by_label("last frame").wait_for()
         first = page.get_by_label("first frame")
-        first.fill("1")
+        first.fill("21")
         first.press("Enter")
-        page.get_by_text("the first pose is that of frame 0; give a first frame up to there").wait_for()
-
-
-def test_frames_before_the_first_pose_are_asked_for_and_taken_back(tmp_path):
-    folder = shutil.copytree(THROWN_CROSS, tmp_path / "cross")
-    trial = edit_trial(folder / "trial.toml", "trial.toml", ("frame = 0", "frame = 20"))
-    with fork_studio(trial) as address, open_page(address.replace("/?", "/track?")) as page:
-        first = page.get_by_label("first frame")
+        page.get_by_text("the first pose is that of frame 20; give a first frame up to there").wait_for()
         first.fill("5")
         first.press("Enter")
         page.get_by_text("from frame 20, the first pose's, on and back").wait_for()

@@ -11,7 +11,7 @@ from tests.support.browser import open_page
 from tests.support.players_trial import write_run, write_trial
 from tests.support.studio import fork_studio, wait_for_frame
 
-SLOW_S = 1.5  # what a read takes in these tests
+SLOW_S = 0.5  # what a read takes in these tests
 
 
 def slow(function):
@@ -77,7 +77,7 @@ def test_a_slow_stop_and_slow_help_are_announced_and_quick_ones_are_not(address)
                 .observe(document.body, { childList: true, subtree: true });
         }""")
         page.get_by_role("switch", name="epipolar help").click()  # off: nothing to read
-        page.wait_for_timeout(1000)
+        page.wait_for_timeout(500)
         assert page.evaluate("window.notes") == 0
         page.goto("/".join([*address.split("/")[:3], "sync"]))
         page.get_by_role("button", name="Find the offsets").click()

@@ -6,7 +6,6 @@ import re
 import shutil
 import signal
 import time
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +13,14 @@ import numpy as np
 import pytest
 
 from airborne.calibration.sources.control_points import read_control_points
+from airborne.io.folder_lock import find_writer
 from airborne.motion import read_motion
 from airborne.run.track import track_trial
 from airborne.trial.calibration import CalibrationTable
 from airborne.trial.file import read_trial
 from tests.support.browser import MINUTE, open_page
 from tests.support.places import ROOT, THROWN_CROSS
-from tests.support.studio import User, open_studio, wait_for_frame
+from tests.support.studio import User, fork_studio, wait_for_frame
 
 MOST_CLICKS = 60
 N_POINTS = 12  # surveyed points that are clicked in all three cameras
@@ -103,24 +103,16 @@ def pause_tracking(folder):
     """Hold `airborne track` as soon as it has written some frames, so that it is stopped before its end."""
     while n_tracked(folder) < 3:
         time.sleep(0.01)
-    os.kill(tracking_process(folder), signal.SIGSTOP)
+    os.kill(find_writer(folder / "results"), signal.SIGSTOP)
 
 
 def resume_tracking(folder):
     """Let it go on once it has been told to stop."""
-    status = Path(f"/proc/{tracking_process(folder)}/status")
+    number = find_writer(folder / "results")
+    status = Path(f"/proc/{number}/status")
     while not int(re.search(r"^ShdPnd:\s*(\w+)", status.read_text(), re.MULTILINE)[1], 16) >> (signal.SIGTERM - 1) & 1:
         time.sleep(0.01)
-    os.kill(tracking_process(folder), signal.SIGCONT)
-
-
-def tracking_process(folder):
-    """Return the number of the process that tracks in a folder."""
-    for each in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if (each / "cwd").resolve() == folder.resolve() and b"\0track\0" in (each / "cmdline").read_bytes():
-                return int(each.name)
-    raise AssertionError("no process tracks")
+    os.kill(number, signal.SIGCONT)
 
 
 def n_tracked(folder):
@@ -143,7 +135,7 @@ def error_mm(folder):
 
 def test_the_thrown_cross_from_videos_to_report(folder):
     requests = []
-    with open_studio(folder) as address, open_page(address, requests) as page:
+    with fork_studio(folder) as address, open_page(address, requests) as page:
         user = User(page)
         page.get_by_text("Use these cameras").wait_for()
         user.press("Use these cameras")

@@ -25,8 +25,8 @@ CORPUS = Path(__file__).resolve().parents[1] / "corpus"  # a folder a reader
 CPU_LIMIT_S = 4.0
 MEMORY_LIMIT_BYTES = 1_000_000_000  # above what the process takes with everything loaded
 WEIGHTS = {
-    **{"video": 0.25, "images of a video": 0.25, "sound": 0.5},
-    **{"command line": 0.3, "mesh.ply": 0.5, "mesh.stl": 0.5, "run summary": 0.3},
+    **{"video": 0.4, "images of a video": 0.4, "sound": 0.5},
+    **{"command line": 0.4, "mesh.ply": 0.5, "mesh.stl": 0.5, "run summary": 0.4},
 }
 
 

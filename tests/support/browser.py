@@ -27,9 +27,16 @@ def open_page(address: str, requests: list[str] | None = None) -> Iterator:
 
     `requests` takes the addresses that are asked for.
     """
+    with open_blank(address, requests) as page:
+        page.goto(address)
+        yield page
+
+
+@contextmanager
+def open_blank(address: str, requests: list[str] | None = None) -> Iterator:
+    """Open a page that has not yet gone anywhere, and may go to the server of an address alone; as `open_page`."""
     host = address.split("/")[2]
     with _browser_page(lambda url: url.split("/")[2] == host, [] if requests is None else requests) as page:
-        page.goto(address)
         yield page
 
 

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +14,8 @@ from typing import IO, Any
 from airborne.cli import main
 from airborne.studio import commands
 
-_FORKS = multiprocessing.get_context("forkserver")
+FORKS = multiprocessing.get_context("forkserver")
+FORKS.set_forkserver_preload(["airborne.cli", "airborne.studio.server", "tests.support.studio_ready"])
 _RUN = commands._RUN  # the code of the command line
 
 
@@ -23,9 +25,9 @@ class ForkedCommand:
     def __init__(
         self, words: Sequence[str], *, cwd: Path, stdin: int, stdout: int, stderr: IO, env: Mapping[str, str]
     ) -> None:
-        ours, out = _FORKS.Pipe(duplex=False)
+        ours, out = FORKS.Pipe(duplex=False)
         arguments = (tuple(words[3:]), cwd, out, Path(stderr.name), dict(env))
-        self._process = _FORKS.Process(target=_run_words, args=arguments)
+        self._process = FORKS.Process(target=_run_words, args=arguments)
         self._process.start()
         out.close()
         self.stdout = os.fdopen(os.dup(ours.fileno()), "rb")
@@ -49,11 +51,15 @@ class ForkedCommand:
 
 def fork_commands() -> None:
     """Let the commands of this process's studio be forks, but for those whose code a test has replaced."""
-    commands.subprocess = SimpleNamespace(**vars(subprocess) | {"Popen": _start})
+    forkserver._forkserver.ensure_running = lambda: None  # it runs; Python starts each fork another, which imports all
+    commands.subprocess = FORKED
 
 
 def _start(words: Sequence[str], **options: Any) -> Any:
     return (ForkedCommand if words[2] == _RUN else subprocess.Popen)(words, **options)
+
+
+FORKED = SimpleNamespace(**vars(subprocess) | {"Popen": _start})  # what `subprocess` is to the studio's commands
 
 
 def _run_words(words: tuple[str, ...], folder: Path, out: Connection, log: Path, env: Mapping[str, str]) -> None:

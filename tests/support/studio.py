@@ -1,6 +1,5 @@
 """The studio as a process, and its pages in a browser."""
 
-import multiprocessing
 import os
 import re
 import signal
@@ -19,11 +18,9 @@ from airborne.io.folder_lock import LOCK
 from airborne.studio import field_order
 from airborne.studio.prefetch import Prefetch
 from airborne.studio.writing import FOLDER
-from tests.support.forked_commands import fork_commands
+from tests.support.forked_commands import FORKS, fork_commands
 
 RUN = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main; main()"
-_FORKS = multiprocessing.get_context("forkserver")
-_FORKS.set_forkserver_preload(["airborne.cli", "airborne.studio.server", "tests.support.studio_ready"])
 _NAME = "MainProcess"  # of a process in which NiceGUI serves
 CLICK_SD_PX = 1.0  # of a user's clicks, right and down
 N_BITS, BLOCK_PX = 10, 24  # of numbers burnt into pictures
@@ -51,9 +48,9 @@ def fork_studio(path: Path, *options: str, before: Callable[[], None] | None = N
     So are the commands that it starts. It makes no pictures that nobody asks for, and looks at few to show the order of
     fields. `before`, a function of a module, is called there first.
     """
-    (ours, out), (ours_of_errors, errors) = (_FORKS.Pipe(duplex=False) for _ in range(2))
+    (ours, out), (ours_of_errors, errors) = (FORKS.Pipe(duplex=False) for _ in range(2))
     words = ("studio", str(path), "--no-browser", *options)
-    process = _FORKS.Process(target=_run_command, args=(words, path.parent, out, errors, before), name=_NAME)
+    process = FORKS.Process(target=_run_command, args=(words, path.parent, out, errors, before), name=_NAME)
     process.start()
     out.close(), errors.close()
     with open(ours.fileno(), closefd=False) as printed, open(ours_of_errors.fileno(), closefd=False) as complained:
