@@ -15,6 +15,7 @@ from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving
 from tests.support.commands import in_process
+from tests.support.once import remember_calibration
 
 CLICKED = (
     *("corner_near_left_outer", "corner_near_right_outer", "corner_far_left_outer", "corner_far_right_outer"),
@@ -42,6 +43,13 @@ def clicks(names, px):
     head = "point," + ",".join(f"{name}_{axis}" for name in RIG.names for axis in "uv")
     cells = [["" if np.isnan(v) else f"{v:.3f}" for v in row] for row in px.reshape(len(px), -1)]
     return "\n".join([head, *(",".join([name, *row]) for name, row in zip(names, cells, strict=True))]) + "\n"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _once():
+    with pytest.MonkeyPatch.context() as patch:
+        remember_calibration(patch)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,11 @@
-"""What many tests ask of the same videos, found once."""
+"""What many tests ask of the same videos or tables, found once."""
 
+import pickle
 from dataclasses import replace
 from functools import wraps
 
+from airborne.calibration import from_sources
+from airborne.calibration.initial import values
 from airborne.io.files import file_digest
 from airborne.run import mix_ups
 
@@ -21,3 +24,27 @@ def remember_foregrounds(monkeypatch) -> None:
         return known[key]
 
     monkeypatch.setattr(mix_ups, "_foreground", found)
+
+
+def remember_calibration(monkeypatch) -> None:
+    """Let initial cameras be found, and cameras adjusted, once for all calibrations that do it from the same numbers."""
+    for module, name in (
+        (values, "choose_lens"),
+        (values, "initial_rig_from_points"),
+        (values, "initial_rig_from_wand"),
+        (from_sources, "adjust"),
+    ):
+        monkeypatch.setattr(module, name, _remembered(getattr(module, name)))
+
+
+def _remembered(function):
+    known = {}
+
+    @wraps(function)
+    def remember(*args, progress=None, **options):
+        key = pickle.dumps((args, options))
+        if key not in known:
+            known[key] = function(*args, progress=progress, **options) if progress else function(*args, **options)
+        return known[key]
+
+    return remember
