@@ -27,7 +27,7 @@ def remember_foregrounds(monkeypatch) -> None:
 
 
 def remember_calibration(monkeypatch) -> None:
-    """Let initial cameras be found, and cameras adjusted, once for all calibrations that do it from the same numbers."""
+    """Let lenses and initial cameras be found, and cameras adjusted, once for all that do it from the same numbers."""
     for module, name in (
         (values, "choose_lens"),
         (values, "initial_rig_from_points"),
