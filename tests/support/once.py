@@ -8,6 +8,7 @@ from airborne.calibration import from_sources
 from airborne.calibration.initial import values
 from airborne.io.files import file_digest
 from airborne.run import mix_ups
+from airborne.sync import silhouettes
 
 
 def remember_foregrounds(monkeypatch) -> None:
@@ -24,6 +25,25 @@ def remember_foregrounds(monkeypatch) -> None:
         return known[key]
 
     monkeypatch.setattr(mix_ups, "_foreground", found)
+
+
+def remember_silhouettes(monkeypatch) -> None:
+    """Let what moves in a video be segmented once for all trials that hold this video and camera."""
+    segment, known = silhouettes.silhouettes_of, {}
+
+    @wraps(segment)
+    def segmented(source, camera, on_image=lambda: None):
+        place = camera.camera_from_world.as_matrix().tobytes()
+        seen_by = camera.name, camera.K.tobytes(), camera.distortion.tobytes(), camera.size, camera.lens, place
+        key = file_digest(source.path), replace(source, path=""), seen_by
+        if key not in known:
+            known[key] = segment(source, camera, on_image)
+        else:
+            for _ in known[key].time_s:
+                on_image()
+        return known[key]
+
+    monkeypatch.setattr(silhouettes, "silhouettes_of", segmented)
 
 
 def remember_calibration(monkeypatch) -> None:
