@@ -57,14 +57,11 @@ def check_board_print(
         np.median(detected) >= _DETECTED_SHARE * n_corners
     )
     findings = list(_wrong_charuco(board, sample, where, camera, is_found=is_found))
-    if findings or is_found:
-        return findings
-    return [_not_detected(board, sample, counts, where=where, camera=camera)]
+    return findings if findings or is_found else [_not_detected(board, sample, counts, where=where, camera=camera)]
 
 
 def _corner_counts(board: Board, pictures: Sequence[Image], memory: Memory | None = None) -> list[int]:
-    detect = board_detector(board, memory)
-    return [len(detect(picture).corner) for picture in pictures]
+    return [len(sighting.corner) for sighting in map(board_detector(board, memory), pictures)]
 
 
 def _not_detected(
