@@ -16,7 +16,7 @@ set_up_libraries()  # as the command line does
 
 from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
-from tests.support.once import remember_foregrounds
+from tests.support.once import remember_foregrounds, remember_silhouettes
 from tests.support.places import ROOT
 
 SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
@@ -104,6 +104,7 @@ def pytest_terminal_summary(terminalreporter, config):
 def _foregrounds():
     with pytest.MonkeyPatch.context() as patch:
         remember_foregrounds(patch)
+        remember_silhouettes(patch)
         yield
 
 

@@ -1,12 +1,15 @@
 """A waved board before cameras that do not look at the same instant: time stamps say which images belong together."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from airborne.calibration import calibrate_from, sources_from
+from airborne.calibration import calibrate_from, from_sources, sources_from
 from airborne.calibration.initial.values import read_inputs
+from airborne.calibration.sources.board_detection import detect_boards
 from airborne.errors import CalibrationError
-from tests.support.calibration_scenes import board_at, board_pictures, three_side_by_side, write_videos
+from tests.support.calibration_scenes import BOARD, board_at, board_pictures, three_side_by_side, write_videos
 from tests.support.rigs import apart
 
 RIG = three_side_by_side()
@@ -44,7 +47,9 @@ def silent(what, done, total):
     pass
 
 
-def test_lags_are_found_and_the_rig_is_better_than_without(recording):
+def test_lags_are_found_and_the_rig_is_better_than_without(recording, monkeypatch):
+    inputs = read_inputs(sources(recording), silent)  # the same for both
+    monkeypatch.setattr(from_sources, "read_inputs", lambda sources, progress: replace(inputs, sources=sources))
     loose, exact = (calibrate_from(sources(recording, sync=sync), silent) for sync in ("auto", "exact"))
     late_s = {name: float(np.median(lag_s)) for name, lag_s in loose.lag_s.items()}
     for name, other in (("cam0", "cam1"), ("cam2", "cam1")):
@@ -65,5 +70,5 @@ def test_stamps_of_other_cameras_and_of_images_that_are_missing_are_said(recordi
     ):
         read_inputs(sources(recording, timestamps="half.csv"), silent)
     write_stamps(recording / "gap.csv", (0, 1, 2), skip={(k, 1) for k in (10, 11, 12)})
-    detections = read_inputs(sources(recording, timestamps="gap.csv"), silent).board_detections
+    detections = detect_boards(sources(recording, timestamps="gap.csv"), BOARD, lambda done, n: None)
     assert [(finding.kind, finding.cameras) for finding in detections.findings] == [("clock", ("cam1",))]

@@ -15,6 +15,7 @@ def silent(what, done, total):
 
 def test_four_cameras_around_a_two_sided_board_are_joined(shared_data, monkeypatch):
     monkeypatch.setattr(board_detection, "_MOST_MOMENTS", 50)  # half of the images are enough
+    monkeypatch.setattr(board_detection, "_N_SAMPLES", 6)
     folder = shared_data("two_sided_board")
     cameras = [{"name": f"cam_{i}", "video": f"cam_{i}.mp4"} for i in range(4)]
     document = {"camera": cameras, "board": {"file": "charuco.toml"}}

@@ -22,6 +22,7 @@ from tests.support.calibration_scenes import (
     write_videos,
     write_wand,
 )
+from tests.support.once import remember_calibration
 from tests.support.rigs import apart
 
 RIG = three_side_by_side()
@@ -30,6 +31,13 @@ POINTS = np.random.default_rng(1).uniform([-0.6, -0.4, 0.4], [0.6, 0.6, 1.6], (1
 
 def silent(what, done, total):
     pass
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _once():
+    with pytest.MonkeyPatch.context() as patch:
+        remember_calibration(patch)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.calibration import calibrate_from, read_sources
+from airborne.calibration import calibrate_from, read_sources, residual_figures
 from airborne.calibration.report import calibration_to_dict, describe_calibration
 from airborne.cameras import read_rig, write_pose2sim
 from airborne.errors import CalibrationError
 from tests.support import wand_waving as waving
 from tests.support.commands import in_process
+from tests.support.once import remember_calibration
 
 CLICKED = (
     *("corner_near_left_outer", "corner_near_right_outer", "corner_far_left_outer", "corner_far_right_outer"),
@@ -42,6 +43,13 @@ def clicks(names, px):
     head = "point," + ",".join(f"{name}_{axis}" for name in RIG.names for axis in "uv")
     cells = [["" if np.isnan(v) else f"{v:.3f}" for v in row] for row in px.reshape(len(px), -1)]
     return "\n".join([head, *(",".join([name, *row]) for name, row in zip(names, cells, strict=True))]) + "\n"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _once():
+    with pytest.MonkeyPatch.context() as patch:
+        remember_calibration(patch)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +145,8 @@ def test_the_command_writes_the_rig_and_says_how_good_it_is(hall, capsys):
     assert "wand" in printed and "court" in printed
 
 
-def test_one_table_needs_no_file_of_sources(hall):
+def test_one_table_needs_no_file_of_sources(hall, monkeypatch):
+    monkeypatch.setattr(residual_figures, "write_residual_figures", lambda folder, _: folder.mkdir(exist_ok=True) or [])
     named = ",".join(f"{name}=1920x1080" for name in RIG.names)
     for table, options in (("court.csv", ("--court", "men", "--size", "1920x1080")), ("pair.csv", ("--wand", 0.6))):
         if options[0] == "--wand":

@@ -58,11 +58,33 @@ def tiny(scene, all_frames):
     patch.undo()
 
 
+def track_once(known):
+    """Return `track_scene` of the one scene that gives what is known, after its reports of progress."""
+
+    def track(scene, runs, progress):
+        if runs not in known:
+            known[runs] = track_scene(scene, runs, progress)
+            return known[runs]
+        for _ in range(SHORT):
+            progress()
+        return known[runs]
+
+    return track
+
+
 @pytest.fixture(scope="module")
-def done(tiny, tmp_path_factory):
+def tracked():
+    """What was tracked, by runs."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def done(tiny, tracked, tmp_path_factory):
     """A folder with a finished run, its reports of progress, and its summary."""
     folder, reports = tmp_path_factory.mktemp("block") / "out", []
-    summary = reproduce_blockjump(folder, True, lambda *now: reports.append(now), n_processes=1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(takes_module, "track_scene", track_once(tracked))
+        summary = reproduce_blockjump(folder, True, lambda *now: reports.append(now), n_processes=1)
     return folder, reports, summary
 
 
@@ -168,6 +190,7 @@ def test_run_goes_on_with_the_sequences_that_are_missing_and_gives_the_same(done
         (again / "sequences" / name).write_bytes((folder / "sequences" / name).read_bytes())
     tracked = []
     monkeypatch.setattr(takes_module, "track_scene", lambda *args: tracked.append(args[0].name) or track_scene(*args))
+    monkeypatch.setattr(experiment, "write_block_figures", lambda *_: None)
     reports = []
     resumed = reproduce_blockjump(again, True, lambda *now: reports.append(now), n_processes=1)
     assert len(tracked) == 1
@@ -176,7 +199,9 @@ def test_run_goes_on_with_the_sequences_that_are_missing_and_gives_the_same(done
         np.testing.assert_allclose(resumed["rows"][name]["mean_mm"]["mean"], row["mean_mm"]["mean"], atol=EXACT)
 
 
-def test_stopped_run_leaves_whole_sequences_only(tiny, tmp_path):
+def test_stopped_run_leaves_whole_sequences_only(done, tracked, monkeypatch, tmp_path):
+    monkeypatch.setattr(takes_module, "track_scene", track_once(tracked))
+
     def stop_in_the_second(done, _):
         if done > SHORT + 1:
             raise KeyboardInterrupt
@@ -209,7 +234,9 @@ def test_stopped_command_says_how_to_go_on_and_exits_130(tmp_path, monkeypatch, 
     assert "to resume" in capsys.readouterr().err
 
 
-def test_what_goes_wrong_in_another_process_is_raised_here(tmp_path):
+def test_what_goes_wrong_in_another_process_is_raised_here(tmp_path, monkeypatch):
+    pool = takes_module.ProcessPoolExecutor
+    monkeypatch.setattr(takes_module, "ProcessPoolExecutor", lambda n, *options: pool(1, *options))  # one is enough
     takes = [BlockTake(number=k, scene_seed=k, n_blockers=1, n_frames=10, runs=()) for k in range(2)]
     with pytest.raises(TrialError, match="too few"):
         do_takes(tmp_path / "sequences", takes, n_processes=2)

@@ -1,10 +1,14 @@
-"""What many tests ask of the same videos, found once."""
+"""What many tests ask of the same videos or tables, found once."""
 
+import pickle
 from dataclasses import replace
 from functools import wraps
 
+from airborne.calibration import from_sources
+from airborne.calibration.initial import values
 from airborne.io.files import file_digest
 from airborne.run import mix_ups
+from airborne.sync import silhouettes
 
 
 def remember_foregrounds(monkeypatch) -> None:
@@ -21,3 +25,46 @@ def remember_foregrounds(monkeypatch) -> None:
         return known[key]
 
     monkeypatch.setattr(mix_ups, "_foreground", found)
+
+
+def remember_silhouettes(monkeypatch) -> None:
+    """Let what moves in a video be segmented once for all trials that hold this video and camera."""
+    segment, known = silhouettes.silhouettes_of, {}
+
+    @wraps(segment)
+    def segmented(source, camera, on_image=lambda: None):
+        place = camera.camera_from_world.as_matrix().tobytes()
+        seen_by = camera.name, camera.K.tobytes(), camera.distortion.tobytes(), camera.size, camera.lens, place
+        key = file_digest(source.path), replace(source, path=""), seen_by
+        if key not in known:
+            known[key] = segment(source, camera, on_image)
+        else:
+            for _ in known[key].time_s:
+                on_image()
+        return known[key]
+
+    monkeypatch.setattr(silhouettes, "silhouettes_of", segmented)
+
+
+def remember_calibration(monkeypatch) -> None:
+    """Let lenses and initial cameras be found, and cameras adjusted, once for all that do it from the same numbers."""
+    for module, name in (
+        (values, "choose_lens"),
+        (values, "initial_rig_from_points"),
+        (values, "initial_rig_from_wand"),
+        (from_sources, "adjust"),
+    ):
+        monkeypatch.setattr(module, name, _remembered(getattr(module, name)))
+
+
+def _remembered(function):
+    known = {}
+
+    @wraps(function)
+    def remember(*args, progress=None, **options):
+        key = pickle.dumps((args, options))
+        if key not in known:
+            known[key] = function(*args, progress=progress, **options) if progress else function(*args, **options)
+        return known[key]
+
+    return remember

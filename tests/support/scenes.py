@@ -111,6 +111,10 @@ def clutter(seed: int, *colours) -> np.ndarray:
     return light_from_srgb(picture).astype(np.float32)
 
 
+_LATELY: dict[tuple, tuple[np.ndarray, np.ndarray]] = {}  # bodies drawn
+_N_LATELY = 100
+
+
 @dataclass(frozen=True)
 class Scene:
     """What is filmed; every picture is a pure function of it."""
@@ -143,7 +147,7 @@ class Scene:
     def _picture(self, index: int, i: int, seen_by: Camera, pose: Pose | None) -> np.ndarray:
         light = self.backgrounds[i]
         if pose is not None:
-            share, shown = _drawn(self.model, pose, seen_by, self.reach)
+            share, shown = _drawn_lately(self.model, pose, seen_by, self.reach)
             light = (1 - share) * light + shown
         rng = np.random.default_rng([index, i])
         noise = self.noise_grey * rng.standard_normal(light.shape, np.float32)
@@ -160,6 +164,17 @@ class Scene:
 def srgb_from_light(light: np.ndarray) -> np.ndarray:
     """Turn linear light 0..1 into sRGB 0..255, any shape; brighter light is cut."""
     return SRGB[np.rint(np.clip(light, 0, 1) * (len(SRGB) - 1)).astype(int)]
+
+
+def _drawn_lately(model: BodyModel, pose: Pose, seen_by: Camera, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """What `_drawn` returns: scenes differ in light, noise or which cameras see, and show the same."""
+    place, angles = pose.world_from_root.as_matrix().tobytes(), pose.joint_angles.tobytes()
+    key = model, place, angles, seen_by, reach
+    if key not in _LATELY:
+        if len(_LATELY) == _N_LATELY:
+            del _LATELY[next(iter(_LATELY))]
+        _LATELY[key] = _drawn(model, pose, seen_by, reach)
+    return _LATELY[key]
 
 
 def _drawn(model: BodyModel, pose: Pose, seen_by: Camera, reach: float) -> tuple[np.ndarray, np.ndarray]:

@@ -63,6 +63,6 @@ def film_wand(folder: Path, rig: Rig, *, colours=(RED, RED), n=60, seed=0, with_
                             px[k, m, i] = ends[m]
                 if rng.random() < stray:
                     cv2.circle(image, rng.integers((20, 20), (460, 340)).tolist(), 6, colours[0], -1, cv2.LINE_AA)
-                noise = rng.normal(0, 4, image.shape).astype(np.int8)
+                noise = (4 * rng.standard_normal(image.shape, np.float32)).astype(np.int8)
                 writer.write(cv2.add(image, noise, dtype=cv2.CV_8U))
     return px

@@ -34,11 +34,10 @@ def test_flashes_bring_cameras_together_within_an_image(tmp_path):
 
 
 def test_the_stated_sd_holds_over_many_starts(tmp_path):
-    misses = []
+    first, misses = film(tmp_path / "a.mkv", 0.0, n_s=2), []
     for seed in range(12):
         late_s = float(np.random.default_rng(seed).uniform(-0.3, 0.3))
-        sources = [film(tmp_path / "a.mkv", 0.0, n_s=2), film(tmp_path / "b.mkv", late_s, n_s=2)]
-        found = offsets_by_flash(sources)
+        found = offsets_by_flash([first, film(tmp_path / "b.mkv", late_s, n_s=2)])
         misses.append((found.offset_s[1] - late_s) / found.offset_sd_s[1])
     assert np.sqrt(np.mean(np.square(misses))) < 1.6
     assert np.max(np.abs(misses)) < 3

@@ -181,7 +181,7 @@ def test_tracking_that_starts_nowhere_says_so(trial):
 def test_tracking_finds_a_camera_that_is_half_a_field_late(trial):
     late_s = FIELD_S / 2
     text = trial.read_text().replace('name = "cam3"', f'name = "cam3"\noffset_s = {late_s}')
-    trial.write_text(text + "stop = 16\n")
+    trial.write_text(text + "stop = 12\n")
     found = synchronise(read_trial(trial), by="tracking")
     assert found.offset_s[0] == 0
     assert abs(found.offset_s[1]) < 1e-3 and abs(found.offset_s[2]) < 1e-3, "both cameras are in time"

@@ -14,7 +14,7 @@ from airborne.tracking.tracker import step
 from tests.support.synthetic import small_scene
 
 EXPOSURE_S = 0.016
-SCENE = small_scene("side-somersault", scale=2, n_pictures=10, exposure_s=EXPOSURE_S, noise_sd=2.0)
+SCENE = small_scene("side-somersault", scale=2, n_pictures=8, exposure_s=EXPOSURE_S, noise_sd=2.0)
 
 
 @pytest.fixture(scope="module")

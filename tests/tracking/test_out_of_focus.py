@@ -1,6 +1,7 @@
 """A camera whose lens is out of focus."""
 
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -17,6 +18,11 @@ SCENE = small_scene("half-twist", scale=2, n_pictures=8, noise_sd=2.0)
 BLUR_PX = 2.0
 
 
+@cache
+def frames_seen():
+    return list(scene_frames(SCENE))
+
+
 def _defocus(view, sd):
     aspect = view.camera.K[1, 1] / view.camera.K[0, 0]
     return replace(view, image=cv2.GaussianBlur(view.rgb, (0, 0), sd, sigmaY=sd * aspect))
@@ -29,7 +35,7 @@ def track(monkeypatch, blurs_px, is_known):
     truth = SCENE.flight(np.array([float(SCENE.time_s(i)) for i in range(8)]))
     tracker = RefinedTracker(SCENE.model, truth.pose(0))
     state, squares, estimate = tracker.init(), [], None
-    for frames in scene_frames(SCENE):
+    for frames in frames_seen():
         views = [_defocus(view, sd) for view, sd in zip(frames.views, blurs_px, strict=True)]
         frames = replace(frames, views=tuple(views))
         state, estimate = step(tracker, state, frames)

@@ -9,8 +9,8 @@ from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.recovery import colour_nats, identity_probabilities
 from tests.support.jumping_scenes import Hall, hop
 
-AWAY = range(3, 23)  # frames at 50 a second
-BACK = 30
+AWAY = range(3, 13)  # frames at 50 a second
+BACK = 18
 
 
 def elsewhere(before, after):

@@ -6,7 +6,7 @@ from airborne.tracking.methods import Settings, tracker_of
 from tests.support.scenes import FIGURE, FPS, Scene, clutter, standing, thrown, track
 from tests.support.states import assert_same, leaves
 
-FRAMES, ABSENT = 8, 2
+FRAMES, ABSENT = 6, 2
 SCENE = Scene(
     motion=lambda time_s: None if time_s * FPS == ABSENT else thrown(time_s),
     backgrounds=tuple(clutter(seed, (220.0, 190.0, 40.0)) for seed in range(4)),
@@ -34,9 +34,9 @@ def test_learning_the_first_frames_and_searching_on_is_searching_all(name):
     searched = track(scene(name), range(FRAMES), tracker(name))
     resumed = tracker(name)
     state = resumed.init()
-    for estimate in searched[:5]:
+    for estimate in searched[:4]:
         state = resumed.learn(state, scene(name).frames(estimate.index), estimate)
-    for before in searched[5:]:
+    for before in searched[4:]:
         frames = scene(name).frames(before.index)
         estimate = resumed.search(state, frames)
         assert_same(leaves(estimate), leaves(before))

@@ -51,6 +51,12 @@ class LandmarkProblem:
         return np.asarray(np.isfinite(self.targets).all(axis=1))
 
     @cached_property
+    def given(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
+        """Of the landmarks with a target (n,): the segments, the places (n, 3) in them, the targets, and the scales."""
+        rows = self.is_given
+        return self.segments[rows], self.local[rows], self.targets[rows], (self.root_weights / self.sd_m)[rows]
+
+    @cached_property
     def prior(self) -> Array:
         """The pose that the joints' prior is about, as angles: (joints, 3) [rad]."""
         neutral = np.zeros((self.model.n_joints, 3)) if self.neutral is None else self.neutral
@@ -103,34 +109,37 @@ class _Iterate:
     def step(self, damping: float) -> tuple[PoseState, float]:
         """Return the state after a damped step; no decrease is predicted, as it may reach limits."""
         _, gradient, hessian = self.equations
-        damped = (hessian + np.diag(damping * np.diag(hessian) + 1e-9))[np.ix_(self.free, self.free)]
+        rows = np.flatnonzero(self.free)
+        damped = hessian[rows[:, None], rows]
+        damped.flat[:: len(rows) + 1] += damping * damped.diagonal() + 1e-9
         step = np.zeros(len(gradient))
-        step[self.free] = np.linalg.solve(damped, -gradient[self.free])
-        R = Rotation.from_rotvec(step[3:6]).as_matrix() @ self.state.R
+        step[rows] = np.linalg.solve(damped, -gradient[rows])
+        R = Rotation.from_rotvec(step[3:6]).as_matrix() @ self.state.R if self.free[:6].any() else self.state.R
         angles = compose_rotation_vectors(self.state.angles, step[6:].reshape(-1, 3))
         return PoseState(R, self.state.t + step[:3], angles), np.inf
 
 
 def _equations(problem: LandmarkProblem, state: PoseState) -> tuple[float, Array, Array]:
     """Return half the squared residuals, their gradient and Gauss-Newton Hessian."""
-    has_target, scale = problem.is_given, (problem.root_weights / problem.sd_m)[problem.is_given]
+    own, local, targets, scale = problem.given
     rotations = matrix_from_angles(state.angles)
     R, t = problem.model.pose_segments(state.R, state.t, state.angles[None])
     posed = PosedBody(problem.model, R[0], t[0])
-    own = problem.segments[has_target]
-    points = np.einsum("nij,nj->ni", posed.R[own], problem.local[has_target]) + posed.t[own]
+    points = np.einsum("nij,nj->ni", posed.R[own], local) + posed.t[own]
     jacobian = point_jacobian(posed, own, points)
     n_joints = len(state.angles)
     J = (scale[:, None, None] * jacobian).reshape(-1, 6 + 3 * n_joints)
-    r = (scale[:, None] * (points - problem.targets[has_target])).ravel()
+    r = (scale[:, None] * (points - targets)).ravel()
     deviation = rotation_vectors_between(problem.prior, state.angles).ravel() / _JOINT_SD_RAD
     gradient, hessian = J.T @ r, J.T @ J
     gradient[6:] += deviation / _JOINT_SD_RAD
-    hessian[range(6, len(hessian)), range(6, len(hessian))] += _JOINT_SD_RAD**-2
+    hessian.flat[6 * (len(hessian) + 1) :: len(hessian) + 1] += _JOINT_SD_RAD**-2
     cost = float(r @ r + deviation @ deviation) / 2
     limits = problem.model.limits
     excess = limits.excess(rotations) / _LIMIT_SD_RAD
-    joints = np.flatnonzero(np.any(excess != 0, axis=-1))
+    joints = np.flatnonzero((excess != 0).any(axis=-1))
+    if not len(joints):
+        return cost, gradient, hessian
     jacobians = swing_twist_jacobian(limits.relative(rotations)[joints]) / _LIMIT_SD_RAD
     size = np.linalg.norm(excess[joints], axis=1)
     rows = ((excess[joints] / size[:, None])[:, None] @ jacobians)[:, 0]

@@ -14,7 +14,7 @@ from tests.support.board_prints import photographed
 
 CHARUCO = Board(kind="charuco", columns=5, rows=4, square_m=0.1, marker_m=0.07, dictionary="DICT_5X5_50")
 CHESS = Board(kind="chessboard", columns=7, rows=4, square_m=0.08)
-CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], focal_px=480, size=(560, 400))
+CAMERA = camera_looking_at("cam", [0, -1.2, 0], [0, 0, 0], focal_px=300, size=(350, 250))
 
 
 def pictures(board, n=3):
@@ -81,7 +81,7 @@ def test_squares_counted_for_inner_corners_are_reported():
 
 
 def test_nothing_in_the_images_is_reported_as_that():
-    empty = [np.full((400, 560), 90, np.uint8)] * 3
+    empty = [np.full((250, 350), 90, np.uint8)] * 3
     assert "found in 0 of 3 images, with 0 of its 12 corners at most" in sentence(CHARUCO, empty)
     assert "no other board is either" in sentence(CHESS, empty)
     assert check_board_print(CHARUCO, [], "cam1") == []

@@ -75,7 +75,7 @@ def test_a_fisheye_is_offered_fisheye_models_alone_and_starts_without_a_pinhole(
     assert np.linalg.norm(choose_simplest(candidates).pinhole.centre - truth.centre) < 0.02
 
 
-@pytest.mark.parametrize("n", [28, 150])
+@pytest.mark.parametrize("n", [28, 80])
 def test_places_of_a_lens_that_no_model_has_lie_within_two_stated_deviations(n):
     """A stereographic lens with tangential distortion; 12 cameras, so 36 coordinates."""
     errors = []

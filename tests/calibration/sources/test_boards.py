@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.calibration.sources.board_print import match_print
-from airborne.calibration.sources.boards import Board, board_detector, board_from_table, read_board
+from airborne.calibration.sources.boards import Board, board_detector, board_from_table, mirror_image, read_board
 from airborne.cameras import camera_looking_at
 from airborne.errors import CalibrationError
 from tests.support.board_prints import photographed
@@ -54,6 +54,22 @@ def test_an_image_without_the_board_shows_nothing():
     grey = np.random.default_rng(0).integers(0, 255, (200, 300), dtype=np.uint8)
     for board in (CHARUCO, CHESS):
         assert len(board_detector(board)(grey).corner) == 0
+
+
+def test_with_a_memory_no_image_is_searched_twice_from_either_side():
+    front, memory = photographed(CHARUCO, CAMERA, facing((10, 10, 10))), {}
+    both_sides = replace(CHARUCO, is_two_sided=True)
+    pictures = (front, front.copy(), mirror_image(front))
+    seen = [board_detector(both_sides, memory)(picture) for picture in pictures]
+    assert len(memory) == 2
+    for picture, sighting in zip(pictures, seen, strict=True):
+        expected = board_detector(both_sides)(picture)
+        assert np.array_equal(sighting.corner, expected.corner) and np.array_equal(sighting.px, expected.px)
+        assert sighting.is_back == expected.is_back
+    board_detector(replace(CHARUCO, is_inverted=True), memory)(255 - front)
+    assert len(memory) == 2
+    board_detector(replace(CHARUCO, columns=4), memory)(front)
+    assert len(memory) == 3
 
 
 def test_a_board_printed_otherwise_is_reported():

@@ -34,7 +34,7 @@ def posed_at(scene, times):
 
 
 def test_same_scene_gives_the_same_pixels_and_another_seed_does_not():
-    scene = small_scene(n_pictures=2)
+    scene = small_scene(scale=8, n_pictures=2)
     first, again = (list(scene_frames(scene)) for _ in range(2))
     other = list(scene_frames(replace(scene, seed=4)))
     for a, b, c in zip(first, again, other, strict=True):
@@ -44,14 +44,14 @@ def test_same_scene_gives_the_same_pixels_and_another_seed_does_not():
 
 
 def test_one_camera_alone_sees_what_it_sees_among_others():
-    scene = small_scene(n_pictures=2)
+    scene = small_scene(scale=8, n_pictures=2)
     alone = replace(scene, rig=scene.rig.select(["cam1"]))
     for all_views, one_view in zip(scene_frames(scene), scene_frames(alone), strict=True):
         np.testing.assert_array_equal(all_views.views[0].rgb, one_view.views[0].rgb)
 
 
 def test_fields_have_their_own_rows_cameras_and_times():
-    scene = small_scene(noise_sd=0.0)
+    scene = small_scene(scale=8, noise_sd=0.0)
     whole = list(scene_frames(replace(scene, is_interlaced=False)))
     fields = list(scene_frames(scene))
     assert [f.time_s * 50 for f in fields] == [0, 1, 2, 3]
@@ -65,7 +65,7 @@ def test_fields_have_their_own_rows_cameras_and_times():
 def test_fields_fill_whole_frames_where_the_truth_covers_an_odd_number():
     assert cross_scene("side-somersault").n_pictures == 39
     assert cross_scene("side-somersault").n_recorded == 40
-    assert len(list(scene_frames(small_scene(n_pictures=3)))) == 4
+    assert len(list(scene_frames(small_scene(scale=8, n_pictures=3)))) == 4
 
 
 def test_body_lies_in_the_image_at_its_finely_rendered_mask():
@@ -110,7 +110,7 @@ def test_faces_differ_in_brightness_and_some_are_saturated_and_some_dark():
     camera = scene.rig["cam1"]
     backdrop = background(scene, camera)
     reds = []
-    for i in range(0, 34, 4):
+    for i in range(0, 34, 8):
         posed = posed_at(scene, [i / 50])
         mask = visible_surface(surface_arrays(scene.body), posed[0], camera).mask
         reds.append(linear_image(scene, backdrop, posed)[mask][:, 0])

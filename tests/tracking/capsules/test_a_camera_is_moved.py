@@ -16,7 +16,7 @@ from airborne.tracking.capsules.views import map_evidence, map_scale, player_reg
 from tests.support.jumping_scenes import SIDE_BY_SIDE, Hall, errors_mm, hop, share_within
 from tests.support.tolerances import ROUNDTRIP
 
-N = 36
+N = 16
 ALONE, PAIR = Hall({"anna": hop()}), Hall({"anna": hop(), "ben": hop(SIDE_BY_SIDE, late_s=0.1)})
 
 
@@ -49,7 +49,7 @@ def test_it_is_left_out_and_the_others_track_on(camera):
 
 
 def test_it_is_found_when_it_moves_and_taken_back_when_it_returns():
-    registrations, _ = followed(PAIR, lambda index: {2: (14, 0)} if 8 <= index < 20 else {})
+    registrations, _ = followed(PAIR, lambda index: {2: (14, 0)} if 8 <= index < 20 else {}, n=36)
     left_out = [each.left_out for each in registrations]
     assert set(left_out[:8]) == {None} and left_out[15:20] == [2] * 5
     assert left_out[-1] is None

@@ -12,7 +12,7 @@ from airborne.tracking.capsules.first_frame import start_state
 from airborne.tracking.capsules.tracker import look_for_others
 from tests.support.jumping_scenes import Hall, errors_mm, hop, tracked
 
-N = 40
+N = 26
 MATES_M = {"left": (-0.6, -0.65), "right": (0.12, -0.9)}  # where they stand
 
 

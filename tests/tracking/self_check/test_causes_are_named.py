@@ -50,12 +50,13 @@ def seen_by(rig: Rig, frames: Frames) -> Frames:
 RIG = Rig(SCENE.cameras)
 
 
+@cache
 def checked(*, rig=RIG, model=CROSS, late_s=0.0, rate=1.0):
     """Check true poses against the pictures, with wrong files; `late_s` and `rate` of what the second camera shows."""
     frames = frames_seen()
     if rate != 1:
-        other = Scene(motion=lambda time_s: flung(rate * float(time_s)), cameras=SCENE.cameras)
-        frames = [replace(now, views=(now.views[0], other.frames(now.index).views[1], now.views[2])) for now in frames]
+        other = Scene(motion=lambda time_s: flung(rate * float(time_s)), cameras=SCENE.cameras[1:2])
+        frames = [replace(now, views=(now.views[0], other.frames(now.index).views[0], now.views[2])) for now in frames]
     if late_s:
         shift = round(late_s * FPS)
         frames = [
@@ -72,6 +73,7 @@ def checked(*, rig=RIG, model=CROSS, late_s=0.0, rate=1.0):
     return self_check(run, model, rig, path)
 
 
+@cache
 def checked_alone(factor):
     """Check what one camera sees of a body whose file is larger by a factor: it is as much further away."""
     camera = SCENE.cameras[0]
@@ -116,6 +118,9 @@ def larger(factor):
     return rigid_body(*parts)
 
 
+LARGER = larger(1.06)
+
+
 def test_nothing_wrong_raises_no_alarm():
     assert not checked().diagnosis.has_alarm
 
@@ -123,7 +128,7 @@ def test_nothing_wrong_raises_no_alarm():
 @pytest.mark.parametrize(
     ("wrong", "subject", "kind", "value"),
     [
-        ({"model": larger(1.06)}, "body", "scale", 1 / 1.06 - 1),
+        ({"model": LARGER}, "body", "scale", 1 / 1.06 - 1),
         ({"rig": turned(1.5)}, "cam1", "turn_deg", 1.5),
         ({"rig": zoomed(1.06)}, "cam1", "focal", 1 / 1.06 - 1),
         ({"late_s": 0.02}, "cam1", "time_s", 0.02),
@@ -143,7 +148,7 @@ def test_of_an_early_camera_a_smaller_offset_is_asked_for():
     assert replace(early, is_alarm=False).sentence == "camera cam2 seems 20.4 ± 3.4 ms early"
 
 
-@pytest.mark.parametrize("rate", [1.05, 1.1, 0.8])
+@pytest.mark.parametrize("rate", [1.05, 0.8])
 def test_a_wrong_frame_rate_is_named_as_lateness_that_grows(rate):
     first = checked(rate=rate).diagnosis.findings[0]
     over_the_run_s = (rate - 1) * (len(INDICES) - 1) / FPS
@@ -153,7 +158,7 @@ def test_a_wrong_frame_rate_is_named_as_lateness_that_grows(rate):
 
 
 def test_intervals_widen_by_what_is_wrong():
-    right, wrong = checked(), checked(model=larger(1.06))
+    right, wrong = checked(), checked(model=LARGER)
     assert np.all(np.diagonal(wrong.added, axis1=1, axis2=2)[:, :3] >= 0)
     assert np.trace(wrong.constant.mean(axis=0)[:3, :3]) > np.trace(right.constant.mean(axis=0)[:3, :3])
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.calibration.sources.board_print import turn_to_front
-from airborne.calibration.sources.boards import DICTIONARIES, Board, board_detector, mirror_image
+from airborne.calibration.sources.boards import DICTIONARIES, Board, Memory, board_detector, mirror_image
 from airborne.cameras.finding import Finding, join_names
 from airborne.types import Array, Image
 
@@ -34,7 +34,9 @@ class _Markers:
     px: Array  # (n, 4, 2) [px], clockwise from the top left
 
 
-def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "") -> list[Finding]:
+def check_board_print(
+    board: Board, pictures: Sequence[Image], camera: str = "", memory: Memory | None = None
+) -> list[Finding]:
     """Report what in a board's description does not match its print, from grey images (h, w); empty if it is detected.
 
     Of a charuco board: dictionary, inverted print, mirrored images, columns and rows, the markers' size. Of a
@@ -43,9 +45,9 @@ def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "")
     if not len(pictures):
         return []
     sample = [pictures[i] for i in np.unique(np.linspace(0, len(pictures) - 1, _MOST_PICTURES).astype(int))]
-    board, sample = turn_to_front(board, sample)
+    board, sample = turn_to_front(board, sample, memory)
     where = f"{camera}: " if camera else ""
-    counts = _corner_counts(board, sample)
+    counts = _corner_counts(board, sample, memory)
     n_corners = board.inner_size[0] * board.inner_size[1]
     detected = [count for count in counts if count]
     if board.kind == "chessboard":
@@ -55,14 +57,11 @@ def check_board_print(board: Board, pictures: Sequence[Image], camera: str = "")
         np.median(detected) >= _DETECTED_SHARE * n_corners
     )
     findings = list(_wrong_charuco(board, sample, where, camera, is_found=is_found))
-    if findings or is_found:
-        return findings
-    return [_not_detected(board, sample, counts, where=where, camera=camera)]
+    return findings if findings or is_found else [_not_detected(board, sample, counts, where=where, camera=camera)]
 
 
-def _corner_counts(board: Board, pictures: Sequence[Image]) -> list[int]:
-    detect = board_detector(board)
-    return [len(detect(picture).corner) for picture in pictures]
+def _corner_counts(board: Board, pictures: Sequence[Image], memory: Memory | None = None) -> list[int]:
+    return [len(sighting.corner) for sighting in map(board_detector(board, memory), pictures)]
 
 
 def _not_detected(

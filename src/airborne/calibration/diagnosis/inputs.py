@@ -9,7 +9,7 @@ import numpy as np
 from airborne.calibration.diagnosis.boards import check_board_print
 from airborne.calibration.diagnosis.clocks import check_counter, check_times
 from airborne.calibration.initial.chaining import FEWEST_LENS_VIEWS, Views
-from airborne.calibration.sources.boards import Board
+from airborne.calibration.sources.boards import Board, Memory
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
 from airborne.types import Image
@@ -18,14 +18,16 @@ from airborne.types import Image
 _LEAST_SIDE_M, _MOST_SIDE_M = 0.08, 1.6
 
 
-def check_board(views: Views, samples: Mapping[str, Sequence[Image]]) -> tuple[Finding, ...]:
+def check_board(
+    views: Views, samples: Mapping[str, Sequence[Image]], memory: Memory | None = None
+) -> tuple[Finding, ...]:
     """Report what does not match the board's description, from a sample of each camera's images.
 
     Raises CalibrationError, with the reason, where a camera shows the board too rarely to fit its lens.
     """
     findings = check_board_size(views.board)
     for name, row in zip(views.cameras, views.detections, strict=True):
-        own = check_board_print(views.board, samples[name], name)
+        own = check_board_print(views.board, samples[name], name, memory)
         if own and sum(len(sighting.corner) > 0 for sighting in row) < FEWEST_LENS_VIEWS:
             raise CalibrationError(own[0].sentence)
         findings += own

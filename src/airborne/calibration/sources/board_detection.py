@@ -16,7 +16,7 @@ from airborne.calibration.diagnosis.clocks import check_image_counts
 from airborne.calibration.diagnosis.inputs import check_board, check_time_stamps
 from airborne.calibration.initial.chaining import Views
 from airborne.calibration.sources.board_print import match_print, match_sides
-from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, board_detector
+from airborne.calibration.sources.boards import NO_CORNERS, Board, DetectedCorners, Memory, board_detector
 from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.cameras.finding import Finding
 from airborne.errors import CalibrationError
@@ -65,14 +65,15 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
     else:
         raise CalibrationError("some cameras have a video and some images; give the same kind for all")
     samples = {camera.name: _sample_images(sources, camera) for camera in cameras}
-    board, notes = match_print(board, [grey for own in samples.values() for grey in own])
-    board, side_notes = match_sides(board, samples)
+    memory: Memory = {}  # samples are searched several times, most of them among the moments once more
+    board, notes = match_print(board, [grey for own in samples.values() for grey in own], memory)
+    board, side_notes = match_sides(board, samples, memory)
     total = sum(len(own) for own in moments)
     n_moments = max(max(own.values(), default=-1) for own in moments) + 1
     rows, sizes, examples, done = [], {}, {}, 0
     for camera, own in zip(cameras, moments, strict=True):
         row, best = [NO_CORNERS] * n_moments, -1
-        detect = board_detector(board)
+        detect = board_detector(board, memory)
         for index, grey in _read_grey_images(sources, camera, own):
             sizes.setdefault(camera.name, (grey.shape[1], grey.shape[0]))
             row[own[index]] = sighting = detect(grey)
@@ -83,7 +84,7 @@ def detect_boards(sources: Sources, board: Board, progress: Progress) -> BoardDe
         rows.append(tuple(row))
     views = Views(board, tuple(camera.name for camera in cameras), tuple(rows))
     return BoardDetections(
-        views, time_s, sizes, examples, (*notes, *side_notes), (*findings, *check_board(views, samples))
+        views, time_s, sizes, examples, (*notes, *side_notes), (*findings, *check_board(views, samples, memory))
     )
 
 

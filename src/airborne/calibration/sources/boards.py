@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import tomllib
 from collections.abc import Callable
@@ -154,14 +155,16 @@ class DetectedCorners:
 
 NO_CORNERS = DetectedCorners(np.zeros(0, int), np.zeros((0, 2)))
 Detector = Callable[[NDArray[np.uint8]], DetectedCorners]
+Memory = dict[tuple[Board, bytes], DetectedCorners]  # what was detected, by board and image
 
 
-def board_detector(board: Board) -> Detector:
+def board_detector(board: Board, memory: Memory | None = None) -> Detector:
     """Return a detector of the board in grey images (h, w); too few corners, or all on a line, count as none.
 
-    Of a two-sided board it sees the side with more corners.
+    Of a two-sided board it sees the side with more corners. With a memory no image is searched twice.
     """
     find = _charuco_finder(board) if board.kind == "charuco" else _chessboard_finder(board)
+    find = find if memory is None else _remembering_finder(board, find, memory)
     find = _two_sided_finder(board, find) if board.is_two_sided else find
     corners = board.corners[:, :2]
 
@@ -173,6 +176,18 @@ def board_detector(board: Board) -> Detector:
         return detected if extent[1] > _THINNEST * extent[0] else NO_CORNERS
 
     return detect
+
+
+def _remembering_finder(board: Board, find: Detector, memory: Memory) -> Detector:
+    pattern = replace(board, is_inverted=False, is_two_sided=False, thickness_m=0.0)  # all that `find` depends on
+
+    def remember(grey: NDArray[np.uint8]) -> DetectedCorners:
+        contents = hashlib.blake2b(np.ascontiguousarray(grey)).digest() + repr(grey.shape).encode()
+        if (pattern, contents) not in memory:
+            memory[pattern, contents] = find(grey)
+        return memory[pattern, contents]
+
+    return remember
 
 
 def mirror_image(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
