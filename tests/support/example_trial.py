@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import av
+import pytest
 
 from tests.support.clips import write_clip
 from tests.support.places import THROWN_CROSS
@@ -31,8 +32,10 @@ def edit_trial(path: Path, name: str, *replacements: tuple[str, str]) -> Path:
 @cache
 def light_cross() -> Path:
     """Return a copy of the example, which nobody changes: its videos are decoded in a seventh of the time."""
-    folder = Path(tempfile.mkdtemp(prefix="cross-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    parent = tempfile.mkdtemp(prefix="examples-")
+    atexit.register(shutil.rmtree, parent, ignore_errors=True)
+    folder = Path(parent) / THROWN_CROSS.name
+    folder.mkdir()
     for path in THROWN_CROSS.iterdir():
         if path.suffix != ".mp4":
             shutil.copyfile(path, folder / path.name)
@@ -48,6 +51,11 @@ def _free(frame: av.VideoFrame) -> av.VideoFrame:
     """Let the encoder choose what kind of picture a decoded one becomes."""
     frame.pict_type = av.video.frame.PictureType.NONE
     return frame
+
+
+def bundle_light_cross(patch: pytest.MonkeyPatch) -> None:
+    """Let `example_trial` find the light example in the place of the bundled one."""
+    patch.setattr("airborne.trial.examples._FOLDERS", (light_cross().parent,))
 
 
 def copy_cross(folder: Path) -> Path:
