@@ -107,6 +107,16 @@ def _foregrounds():
         yield
 
 
+@pytest.fixture(scope="module")
+def _plain_figures():
+    """Write figures without laying them out, which takes half of their time, where no test looks at them."""
+    from matplotlib.figure import Figure
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "get_layout_engine", lambda figure: None)
+        yield
+
+
 @pytest.fixture(scope="session")
 def shared_data():
     """Find a folder of the shared recordings, `shared/data/<name>` beside the project; skip where it is missing."""

@@ -19,6 +19,8 @@ from airborne.run import result
 from tests.support.example_trial import bundle_light_cross, light_cross
 from tests.support.places import ROOT, THROWN_CROSS
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 PAGE = ROOT / "docs" / "reference" / "python.md"
 STUDY = ROOT / "examples" / "study.ipynb"
 SIXTEEN = '"stop": 16'  # fields of the study; fewer are as good here

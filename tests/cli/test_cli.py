@@ -17,6 +17,8 @@ from tests.support.example_trial import CALIBRATED, LONG, SHORT, edit_trial
 from tests.support.players_trial import write_run, write_truth
 from tests.support.run_files import contents_of, files_of
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 KILLED_AFTER = 4  # rows
 PATIENCE_S = 120
 

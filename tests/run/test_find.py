@@ -21,6 +21,8 @@ from airborne.trial.file import read_trial
 from tests.support.example_trial import light_cross
 from tests.support.places import THROWN_CROSS
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 TRUTH = read_truth(THROWN_CROSS / "truth.csv")
 
 
