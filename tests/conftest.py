@@ -18,6 +18,7 @@ from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
 from tests.support.once import remember_foregrounds
 from tests.support.places import ROOT
+from tests.support.plain_figures import leave_figures_plain
 
 SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
 WARMING = pytest.StashKey[subprocess.Popen]()  # the process that compiles the kernels
@@ -110,10 +111,8 @@ def _foregrounds():
 @pytest.fixture(scope="module")
 def _plain_figures():
     """Write figures without laying them out, which takes half of their time, where no test looks at them."""
-    from matplotlib.figure import Figure
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, "get_layout_engine", lambda figure: None)
+        leave_figures_plain(patch)
         yield
 
 
