@@ -58,8 +58,11 @@ def bundle_light_cross(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("airborne.trial.examples._FOLDERS", (light_cross().parent,))
 
 
-def copy_cross(folder: Path) -> Path:
-    """Copy the light example with its exact cameras, which saves whoever opens it their fit, and return the folder."""
-    shutil.copytree(light_cross(), folder, dirs_exist_ok=True)
+def copy_cross(folder: Path, *, is_light: bool = True) -> Path:
+    """Copy the example with its exact cameras, which saves whoever opens it their fit, and return the folder.
+
+    In the light one a body is found as well, but grey values are smoother over time than its tracker expects.
+    """
+    shutil.copytree(light_cross() if is_light else THROWN_CROSS, folder, dirs_exist_ok=True)
     edit_trial(folder / "trial.toml", "trial.toml", ('control_points = "control_points.csv"', CALIBRATED))
     return folder
