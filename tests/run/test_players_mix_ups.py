@@ -73,8 +73,8 @@ def test_videos_of_their_own_cameras_show_nothing(start, n):
 
 
 @pytest.mark.parametrize(("n", "i", "j"), [(3, 0, 2), (3, 1, 2), (2, 0, 1)])
-def test_two_exchanged_videos_are_named(start, n, i, j):
-    starts, first = start
+def test_two_exchanged_videos_are_named(alone, n, i, j):
+    starts, first = alone
     frames = exchange(only(first, n), i, j)
     assert found(starts, frames) == ("swapped", (NAMES[i], NAMES[j]))
 
