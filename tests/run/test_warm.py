@@ -18,7 +18,7 @@ AIRBORNE = "import sys; sys.argv[0] = 'airborne'; from airborne.cli import main;
 
 
 def test_what_was_warmed_compiles_nothing(tmp_path, capsys, monkeypatch):
-    """Of a fresh clone the kernels are warmed by processes before all tests; here that is no law."""
+    """That processes can share the work is seen where a fresh clone is tested: its kernels are warmed first."""
     monkeypatch.setattr(warm, "ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
     assert in_process("warm") == 0
     assert "kernels are ready" in capsys.readouterr().out
