@@ -18,6 +18,7 @@ from airborne.calibration.from_points import Calibration, calibrate
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
 from tests.support.once import remember_foregrounds, remember_silhouettes
 from tests.support.places import ROOT
+from tests.support.plain_figures import leave_figures_plain
 
 SKIPPED = "airborne/skipped"  # where pytest's cache keeps what the last run skipped
 WARMING = pytest.StashKey[subprocess.Popen]()  # the process that compiles the kernels
@@ -105,6 +106,14 @@ def _foregrounds():
     with pytest.MonkeyPatch.context() as patch:
         remember_foregrounds(patch)
         remember_silhouettes(patch)
+        yield
+
+
+@pytest.fixture(scope="module")
+def _plain_figures():
+    """Write figures without laying them out, which takes half of their time, where no test looks at them."""
+    with pytest.MonkeyPatch.context() as patch:
+        leave_figures_plain(patch)
         yield
 
 

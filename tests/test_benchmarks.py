@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks.rows import changes_since
+from benchmarks.speed import scaling
 from benchmarks.speed.scaling import exponent, main
+from tests.support.synthetic import small_scene
 
 
 def git(folder, *words):
@@ -41,6 +43,7 @@ def test_an_exponent_is_found_beside_a_fixed_cost(power):
 
 
 def test_the_scaling_benchmark_runs(monkeypatch, capsys):
+    monkeypatch.setattr(scaling, "cross_scene", lambda seed: small_scene())
     monkeypatch.setattr(sys, "argv", ["scaling.py", "--quick", "--only", "picture"])
     main()
     assert "exponent" in capsys.readouterr().out

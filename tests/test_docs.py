@@ -43,6 +43,8 @@ from tests.support.export_scenes import PERSON, person_run
 from tests.support.places import ROOT
 from tests.support.run_files import files_of
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 DOCS = ROOT / "docs"
 RESULTS = DOCS / "reference" / "results.md"
 TRIAL = DOCS / "reference" / "trial.md"

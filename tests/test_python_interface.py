@@ -16,10 +16,14 @@ import pytest
 import airborne as ab
 from airborne import interface
 from airborne.run import result
+from tests.support.example_trial import bundle_light_cross, light_cross
 from tests.support.places import ROOT, THROWN_CROSS
+
+pytestmark = pytest.mark.usefixtures("_plain_figures")
 
 PAGE = ROOT / "docs" / "reference" / "python.md"
 STUDY = ROOT / "examples" / "study.ipynb"
+SIXTEEN = '"stop": 16'  # fields of the study; fewer are as good here
 HEAVY = ("cv2", "matplotlib", "nicegui", "numba", "numpy", "pydantic", "rich", "scipy", "xarray")
 
 
@@ -32,6 +36,13 @@ def cells():
     """The notebook's code cells."""
     cells = json.loads(STUDY.read_text(encoding="utf-8"))["cells"]
     return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _light_example():
+    with pytest.MonkeyPatch.context() as patch:
+        bundle_light_cross(patch)
+        yield
 
 
 def run_all(blocks, where):
@@ -113,7 +124,7 @@ def test_repeated_runs_agree_in_python_as_by_the_command(done, tmp_path, monkeyp
 
 def test_examples_of_docstrings_run(done, tmp_path, monkeypatch):
     folder, _ = done
-    shutil.copytree(THROWN_CROSS, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(light_cross(), tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     trial = tmp_path / "trial.toml"
     trial.write_text(trial.read_text(encoding="utf-8") + "stop = 5\n", encoding="utf-8")
@@ -130,7 +141,8 @@ def test_examples_of_docstrings_run(done, tmp_path, monkeypatch):
 def test_the_study_runs_from_top_to_bottom(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mpl.use("Agg")
-    names = run_all(cells(), STUDY)
+    assert SIXTEEN in "".join(cells())
+    names = run_all([each.replace(SIXTEEN, '"stop": 6') for each in cells()], STUDY)
     assert (tmp_path / "results" / "report.html").is_file()
     assert all(path.is_file() for path in names["exported"].files)
 

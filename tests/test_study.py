@@ -7,21 +7,23 @@ import matplotlib as mpl
 import pytest
 
 from tests.support.athletes import ATHLETES, CONDITIONS, write_season
+from tests.support.batch_work import work_here
 from tests.support.pages import STEPS, run
 from tests.support.places import ROOT
 
 PAGE = ROOT / "docs" / "how-to" / "study.md"
 
-pytestmark = pytest.mark.filterwarnings("default")  # those of Dask's own are not ours
+pytestmark = pytest.mark.usefixtures("_plain_figures")
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
     """The folder in which everything was done, and what each command printed."""
     folder, printed = tmp_path_factory.mktemp("study"), {}
-    write_season(folder, n_trials=1, n_pictures=6)
+    write_season(folder, n_trials=1, n_pictures=4)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
+        work_here(patch)
         mpl.use("Agg")
         for _, language, text in STEPS.findall(PAGE.read_text(encoding="utf-8")):
             if language == "bash":

@@ -9,6 +9,8 @@ import pytest
 from tests.support.pages import STEPS, run
 from tests.support.places import ROOT
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 PAGE = ROOT / "docs" / "tutorials" / "first-trial.md"
 FILES = {"my-throw/body.toml", "my-throw/start.csv", "my-throw/trial.toml"}
 

@@ -103,25 +103,13 @@ def test_there_are_as_many_workers_as_memory_holds():
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr(cluster, "_CONNECT_S", 1)  # nobody answers: the time it takes is the time it waits
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.2)  # nobody answers: the time it takes is the time it waits
 
 
 @pytest.mark.usefixtures("impatient")
 def test_no_scheduler_at_an_address_is_one_line():
     with pytest.raises(AirborneError, match="no scheduler answers at tcp"), open_client("tcp://127.0.0.1:1", 1, "auto"):
         pass
-
-
-def test_a_lost_scheduler_ends_a_batch_without_a_word_of_its_own(tmp_path, capfd):
-    with started_dask(tmp_path) as (address, processes), open_client(address, 1, "auto") as client:
-        ended = []
-        for outcome in do_tasks(client, batch_work.tasks(tmp_path, 400), work=batch_work.sleep_shortly):
-            ended.append(outcome)
-            if len(ended) == 3:
-                processes[0].kill()
-    assert 3 <= len(ended) < 400
-    assert not [each for each in ended if each.error]
-    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.fixture(scope="module")
@@ -135,12 +123,14 @@ def season(tmp_path_factory):
     return folder
 
 
-def test_a_batch_by_address_is_what_one_on_this_machine_is(season, tmp_path, capsys):
-    with started_dask(tmp_path) as (scheduler, _):
-        check_batches(season, scheduler, tmp_path, capsys)
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory):
+    with started_dask(tmp_path_factory.mktemp("dask")) as started:
+        yield started
 
 
-def check_batches(season, scheduler, tmp_path, capsys):
+def test_a_batch_by_address_is_what_one_on_this_machine_is(dask, season, tmp_path, capsys):
+    scheduler, _ = dask
     for name, where in (("here", ["--workers", 1]), ("there", ["--scheduler", scheduler])):
         assert in_process("batch", season, "-o", tmp_path / name, "--no-pictures", *where) == 1
     said = capsys.readouterr()
@@ -165,6 +155,20 @@ def check_batches(season, scheduler, tmp_path, capsys):
     assert answer["counts"] == {"unchanged": 2, "failed": 1}
     assert in_process("batch", season, "-o", tmp_path / "there", "--no-pictures", "--dry-run") == 1
     assert "good: leave alone" in capsys.readouterr().out
+
+
+def test_a_lost_scheduler_ends_a_batch_without_a_word_of_its_own(dask, tmp_path, capfd):
+    """No other test has the scheduler after this one."""
+    address, processes = dask
+    with open_client(address, 1, "auto") as client:
+        ended = []
+        for outcome in do_tasks(client, batch_work.tasks(tmp_path, 400), work=batch_work.sleep_shortly):
+            ended.append(outcome)
+            if len(ended) == 3:
+                processes[0].kill()
+    assert 3 <= len(ended) < 400
+    assert not [each for each in ended if each.error]
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_a_dry_run_names_a_video_that_is_missing(season, tmp_path, capsys):

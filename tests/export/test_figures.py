@@ -29,6 +29,7 @@ from airborne.export.figures import (
 from airborne.motion import JointStatus, joint_angles, joint_statuses, landmarks
 from airborne.motion.joints import doubtful_segments, main_joints
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
+from tests.support.plain_figures import leave_figures_plain
 from tests.support.tolerances import ROUNDTRIP
 
 NAMES = ["digitised.png", "errors.png", "pose.png", "score.png"]
@@ -37,6 +38,11 @@ NAMES = ["digitised.png", "errors.png", "pose.png", "score.png"]
 @pytest.fixture(autouse=True)
 def small_figures(monkeypatch):
     monkeypatch.setattr(panels, "DPI", 50)
+
+
+@pytest.fixture
+def _plain(monkeypatch):
+    leave_figures_plain(monkeypatch)
 
 
 def truth_of(motion):
@@ -64,6 +70,7 @@ def test_every_figure_is_written_at_report_width_whatever_the_run_holds(tmp_path
     assert dict(matplotlib.rcParams) == settings
 
 
+@pytest.mark.usefixtures("_plain")
 def test_an_infinite_deviation_shows(tmp_path):
     observed, unseen = run(), run(unseen=(9,))
     write_pose(tmp_path / "seen.png", observed)
@@ -71,6 +78,7 @@ def test_an_infinite_deviation_shows(tmp_path):
     assert (tmp_path / "seen.png").read_bytes() != (tmp_path / "unseen.png").read_bytes()
 
 
+@pytest.mark.usefixtures("_plain")
 def test_a_motion_rotated_by_a_symmetry_of_the_body_gives_the_same_figure(tmp_path):
     motion = run(lost=(4, 5))
     turned = replace(motion, R=motion.R @ HALF_TURN)
@@ -164,6 +172,7 @@ def test_a_body_with_joints_and_masses_gets_three_more_figures(tmp_path, motion)
         assert cv2.imread(str(tmp_path / name)).shape[1] == panels.WIDTH_IN * panels.DPI
 
 
+@pytest.mark.usefixtures("_plain")
 def test_joints_without_masses_get_no_flight(tmp_path):
     weightless = replace(PERSON, segments=tuple(replace(segment, inertia=None) for segment in PERSON.segments))
     write_figures(tmp_path, person_run(), weightless)
@@ -171,6 +180,7 @@ def test_joints_without_masses_get_no_flight(tmp_path):
     assert names == ["joint_status.png", "joints.png", "pose.png", "score.png"]
 
 
+@pytest.mark.usefixtures("_plain")
 def test_flexion_is_positive_in_every_joint_plotted(tmp_path, plotted):
     write_joints_figure(tmp_path / "joints.png", person_run(), PERSON)
     assert len(plotted) == 8
@@ -180,6 +190,7 @@ def test_flexion_is_positive_in_every_joint_plotted(tmp_path, plotted):
         np.testing.assert_allclose(values, expected, atol=1e-9, err_msg=label)
 
 
+@pytest.mark.usefixtures("_plain")
 def test_an_unobservable_joint_is_marked(tmp_path):
     write_joints_figure(tmp_path / "seen.png", person_run(), PERSON)
     write_joints_figure(tmp_path / "unseen.png", person_run(unseen=(5, 6)), PERSON)
@@ -239,6 +250,7 @@ def test_other_bodies_show_their_first_joints():
     assert len(main_joints([f"link {k}" for k in range(30)])) == 8
 
 
+@pytest.mark.usefixtures("_plain")
 def test_the_height_of_a_falling_rigid_body_is_a_parabola_and_its_momentum_is_none(tmp_path, plotted):
     write_flight_figure(tmp_path / "flight.png", person_run(bent=0.0), PERSON)
     height, *momenta = plotted.values()

@@ -7,13 +7,15 @@ import pytest
 from airborne.errors import ResultError
 from airborne.evaluation import JointPaths, Truth, compare_joints, compare_motion
 from airborne.export import headline, page
-from airborne.export.figures import write_figures
+from airborne.export.figures import write_figures, write_flight_figure
 from airborne.export.page import format_value, label
 from airborne.export.report import write_report
 from airborne.motion import Motion, flight_summary, landmarks, measure_flight
 from airborne.motion.run_folder import figures_of
 from tests.support.browser import open_file
 from tests.support.export_scenes import BOX, HALF_TURN, PERSON, person_run, run
+
+pytestmark = pytest.mark.usefixtures("_plain_figures")
 
 
 def html_of(folder, motion, **more):
@@ -119,7 +121,7 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
 
 def test_of_too_few_poses_or_a_body_that_does_not_fall_no_free_fall_is_shown(tmp_path):
     for motion in (person_run(2), replace(run := person_run(60), position=np.tile(run.position[:1], (60, 1)))):
-        write_figures(figures_of(tmp_path), motion, PERSON)
+        write_flight_figure(figures_of(tmp_path) / "flight.png", motion, PERSON)
         html = html_of(tmp_path, motion, flight=flight_summary(motion, measure_flight(motion, PERSON)).to_dict())
         assert "<th>free fall</th><td>none found</td>" in html and "downward acceleration" not in html
 

@@ -21,21 +21,15 @@ from airborne.trial.file import read_trial
 from airborne.video import inspect
 from tests.support.clips import write_clip
 from tests.support.commands import in_process
-from tests.support.places import ROOT
+from tests.support.example_trial import copy_cross
 from tests.support.players_trial import write_trial
 from tests.support.run_files import files_of
-
-EXAMPLE = ROOT / "examples" / "thrown_cross"
 
 
 @pytest.fixture
 def folder(tmp_path):
     """A copy of the example without its control points to fit."""
-    shutil.copytree(EXAMPLE, tmp_path / "trial")
-    path = tmp_path / "trial" / "trial.toml"
-    text = path.read_text(encoding="utf-8")
-    path.write_text(text.replace('control_points = "control_points.csv"', 'file = "calib_true.toml"'), encoding="utf-8")
-    return path.parent
+    return copy_cross(tmp_path / "trial")
 
 
 def edit(folder, *changes):

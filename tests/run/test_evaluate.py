@@ -21,6 +21,8 @@ from tests.support.players_trial import PLAYERS, write_run, write_truth
 from tests.support.run_files import contents_of, files_of
 from tests.test_docs import DOCS
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 
 @pytest.fixture
 def run(tmp_path, thrown_cross):

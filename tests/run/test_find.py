@@ -18,7 +18,10 @@ from airborne.run.check import check_trial
 from airborne.run.frame import write_frame
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
+from tests.support.example_trial import light_cross
 from tests.support.places import THROWN_CROSS
+
+pytestmark = pytest.mark.usefixtures("_plain_figures")
 
 TRUTH = read_truth(THROWN_CROSS / "truth.csv")
 
@@ -27,7 +30,7 @@ TRUTH = read_truth(THROWN_CROSS / "truth.csv")
 def path(tmp_path_factory):
     """The example without its start, with exact cameras."""
     folder = tmp_path_factory.mktemp("find") / "trial"
-    shutil.copytree(THROWN_CROSS, folder)
+    shutil.copytree(light_cross(), folder)
     text = (folder / "trial.toml").read_text(encoding="utf-8")
     text = text.replace('control_points = "control_points.csv"', 'file = "calib_true.toml"')
     text = text[: text.index("[start]")] + text[text.index("[track]") :]

@@ -19,6 +19,8 @@ from airborne.trial.file import Trial, read_trial
 from airborne.trial.keys import KeyTable
 from airborne.trial.masks import MaskTable
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 LAST = 13
 
 

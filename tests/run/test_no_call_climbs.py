@@ -7,7 +7,7 @@ import airborne
 from airborne.run import mix_ups
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
-from tests.support.places import THROWN_CROSS
+from tests.support.example_trial import light_cross
 from tests.test_architecture import ORDER
 
 SOURCE = Path(airborne.__file__).parent
@@ -46,7 +46,7 @@ def calls_during(work) -> set[tuple[tuple[str, str], tuple[str, str]]]:
 
 def test_calls_go_down_the_rooms(tmp_path, monkeypatch):
     monkeypatch.setattr(mix_ups, "_foreground", mix_ups._foreground.__wrapped__)  # here, too, it is found
-    trial = THROWN_CROSS / "trial.toml"
+    trial = light_cross() / "trial.toml"
     calls = calls_during(lambda: track_trial(read_trial(trial, {"stop": 3}), tmp_path / "run", pictures=False))
     assert len({called[0] for _, called in calls}) > 10  # it was watched
     up = {caller[1] for caller, called in calls if ORDER.index(called[0]) > ORDER.index(caller[0])}

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -10,9 +11,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.run.players_cameras import CameraCheck
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.players import StepTracker
-from tests.support.jumping_scenes import Hall, hop
+from tests.support.jumping_scenes import CAMERAS, Hall, hop
 
 HALL, NAMES, N = Hall({"anna": hop()}), ("cam0", "cam1", "cam2"), 46
+
+
+drawn = lru_cache(4)(HALL.frames)  # a frame is asked for by each camera
 
 
 def turned(camera, angle_deg):
@@ -23,11 +27,10 @@ def turned(camera, angle_deg):
 def described(ahead, cameras=3, names=NAMES, n=N, turn_deg=(0, 0, 0)):
     """What is said of a run whose cameras' images come from so many frames ahead of their times."""
     tracker, check = StepTracker(Blocker(HALL.starts())), CameraCheck()
-    state = tracker.init()
+    state, believed = tracker.init(), [turned(CAMERAS[i], turn_deg[i]) for i in range(cameras)]
     for index in range(2, n):
-        views = [HALL.frames(index + ahead[i]).views[i] for i in range(cameras)]
-        views = tuple(replace(each, camera=turned(each.camera, turn_deg[i])) for i, each in enumerate(views))
-        frames = replace(HALL.frames(index), views=views)
+        views = [replace(drawn(index + ahead[i]).views[i], camera=each) for i, each in enumerate(believed)]
+        frames = replace(drawn(index), views=tuple(views))
         step = tracker.search(state, frames)
         check.add(frames, step)
         state = tracker.learn(state, frames, step)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import MistakesError
+from airborne.run import players_mix_ups
 from airborne.run.check import check_trial
 from airborne.run.mix_ups import MixUp
 from airborne.run.players_mix_ups import players_mix_up_in
@@ -51,26 +52,40 @@ def found(starts, frames):
     return finding and (finding.kind, finding.cameras)
 
 
+@pytest.fixture
+def _looked_at_once(monkeypatch):
+    """Find the mix-up in the same images once."""
+    find, known = players_mix_ups.players_mix_up_in, {}
+
+    def found(starts, first):
+        key = tuple(view.rgb.tobytes() for view in first.views)
+        if key not in known:
+            known[key] = find(starts, first)
+        return known[key]
+
+    monkeypatch.setattr(players_mix_ups, "players_mix_up_in", found)
+
+
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_videos_of_their_own_cameras_show_nothing(start, n):
     starts, first = start
     assert found(starts, only(first, n)) is None
 
 
-@pytest.mark.parametrize(("n", "i", "j"), [(3, 0, 1), (3, 0, 2), (3, 1, 2), (2, 0, 1)])
-def test_two_exchanged_videos_are_named(start, n, i, j):
-    starts, first = start
+@pytest.mark.parametrize(("n", "i", "j"), [(3, 0, 2), (3, 1, 2), (2, 0, 1)])
+def test_two_exchanged_videos_are_named(alone, n, i, j):
+    starts, first = alone
     frames = exchange(only(first, n), i, j)
     assert found(starts, frames) == ("swapped", (NAMES[i], NAMES[j]))
 
 
-@pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 1), (3, 2), (2, 0), (2, 1)])
+@pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 2), (2, 1)])
 def test_a_mirrored_video_is_named(alone, n, i):
     starts, first = alone
     assert found(starts, mirror(only(first, n), i)) == ("mirrored", (NAMES[i],))
 
 
-@pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 1), (3, 2), (2, 0), (2, 1)])
+@pytest.mark.parametrize(("n", "i"), [(3, 1), (2, 0)])
 def test_a_video_upside_down_is_named(alone, n, i):
     starts, first = alone
     frames = MixUp((i,), is_turned=True).undo(only(first, n))
@@ -83,12 +98,13 @@ def test_a_camera_without_an_image_is_left_out(start):
     assert found(starts, replace(frames, views=(*frames.views[:2], None))) == ("swapped", NAMES[:2])
 
 
-def test_where_nobody_stands_nothing_is_said(start):
-    starts, first = start
+def test_where_nobody_stands_nothing_is_said(alone):
+    starts, first = alone
     empty = [replace(view, image=np.full_like(view.rgb, 128)) for view in first.views]
     assert found(starts, replace(first, views=tuple(empty))) is None
 
 
+@pytest.mark.usefixtures("_looked_at_once")
 def test_exchanged_files_are_refused_by_check_and_track(tmp_path):
     path = HALL.write_trial(tmp_path, 3, videos=(NAMES[1], NAMES[0], NAMES[2]))
     said = f"the videos of {NAMES[0]} and {NAMES[1]}, or their calibrations, are exchanged; exchange them back"

@@ -18,6 +18,8 @@ from tests.support.players_trial import write_run
 from tests.support.run_files import contents_of, files_of
 from tests.test_docs import DOCS, named, table_of
 
+pytestmark = pytest.mark.usefixtures("_plain_figures")
+
 NEW = {
     *("tables/smooth_motion.csv", "tables/smooth_joints.csv", "tables/smooth_events.csv"),
     *("figures/residuals.png", "smooth.json"),

@@ -12,6 +12,7 @@ from airborne.cameras import Rig
 from airborne.motion import Motion, landmarks
 from airborne.motion.files import read_motion
 from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY, TRACKED_MOTION
+from airborne.motion.smoothing.segments import MIN_FRAMES
 from airborne.run import whole_run
 from airborne.run.opening import open_trial
 from airborne.run.whole_run import fit_whole_run
@@ -20,6 +21,8 @@ from airborne.tracking import Estimate, Status
 from airborne.trial.file import read_trial
 from airborne.video.rereading import Rereading
 from tests.support.commands import in_process, refusal
+from tests.support.example_trial import edit_trial
+from tests.support.once import remember_skins
 from tests.support.run_files import contents_of
 
 N, SCALE = 13, 4
@@ -78,16 +81,29 @@ class TrackedRun:
         return float(np.linalg.norm(landmarks(motion, self.model)[0] - true, axis=-1)[rows].mean())
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _skins():
+    with pytest.MonkeyPatch.context() as patch:
+        remember_skins(patch)
+        yield
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     return TrackedRun(scene_of("ellipsoids"), tmp_path_factory.mktemp("somersault"))
 
 
 @pytest.fixture(scope="module")
-def whole(run, tmp_path_factory):
+def short(run):
+    """The trial of the first frames, whose motion is smooth in as few."""
+    return edit_trial(run.file, "short.toml", (f"stop = {N}", f"stop = {MIN_FRAMES + 1}"))
+
+
+@pytest.fixture(scope="module")
+def whole(short, tmp_path_factory):
     """The folder of the run by the command line, which nobody changes."""
     folder = tmp_path_factory.mktemp("runs") / "whole"
-    assert in_process("track", run.file, "-o", folder, "--no-pictures") == 0
+    assert in_process("track", short, "-o", folder, "--no-pictures") == 0
     return folder
 
 
@@ -145,31 +161,28 @@ def test_a_run_too_short_to_be_smooth_stays_as_it_is(run):
     assert run.fit(run.estimates[:4])[1] is None
 
 
-def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked(run, whole, tmp_path):
+def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked(short, whole, tmp_path):
     again = tmp_path / "again"
     tracked, fitted = read_motion(whole / TRACKED_MOTION), read_motion(whole / MOTION)
     assert np.linalg.norm(fitted.position - tracked.position, axis=1).max() > 1e-4
     shutil.copytree(whole, again)
     (again / SUMMARY).unlink()
     (again / MOTION).write_bytes((again / MOTION).read_bytes()[:-40])  # torn; covariance.bin is the fit's already
-    assert in_process("track", run.file, "-o", again, "--no-pictures", "--resume") == 0
+    assert in_process("track", short, "-o", again, "--no-pictures", "--resume") == 0
     for name in (MOTION, JOINTS, TRACKED_MOTION):
         assert (again / name).read_bytes() == (whole / name).read_bytes()
 
 
-def test_a_refused_resume_leaves_a_fitted_run_as_it_is(run, whole, tmp_path, capsys):
-    folder, other = tmp_path / "run", run.file.with_name("other.toml")
+def test_a_refused_resume_leaves_a_fitted_run_as_it_is(short, whole, tmp_path, capsys):
+    folder = tmp_path / "run"
     shutil.copytree(whole, folder)
     before = contents_of(folder)
-    text = run.file.read_text(encoding="utf-8")
-    other.write_text(text.replace("[track]\n", '[track]\nprediction = "none"\n'), encoding="utf-8")
+    other = edit_trial(short, "other.toml", ("[track]\n", '[track]\nprediction = "none"\n'))
     assert "holds another run" in refusal(capsys, "track", other, "-o", folder, "--no-pictures", "--resume")
     assert contents_of(folder) == before
 
 
-def test_a_trial_may_leave_poses_as_they_are_tracked(run, tmp_path):
-    plain = run.file.with_name("plain.toml")
-    text = run.file.read_text(encoding="utf-8")
-    plain.write_text(text.replace("[track]\n", "[track]\nwhole_run = false\n"), encoding="utf-8")
+def test_a_trial_may_leave_poses_as_they_are_tracked(short, tmp_path):
+    plain = edit_trial(short, "plain.toml", ("[track]\n", "[track]\nwhole_run = false\n"))
     assert in_process("track", plain, "-o", tmp_path / "plain", "--no-pictures") == 0
     assert not (tmp_path / "plain" / TRACKED_MOTION).exists()

@@ -8,21 +8,21 @@ from airborne.study.comparison import adjust_holm
 from airborne.study.random_effects import Cells, estimate_difference, pool, within_spread
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
-RUNS = 400
+RUNS, NODES = 400, 20  # studies that are drawn, and how many of these are the nodes of one curve
 
 
-def draw(rng, *, athletes=8, trials=4, effect=1.0, sd_effect=0.5, sd_trial=1.0, sd_measured=0.5, paired=True):
-    """Draw a study of one number: athletes differ by sd 2, and in their effect."""
-    rows = []
+def draw(rng, *, athletes=8, trials=4, effect=1.0, sd_effect=0.5, sd_trial=1.0, sd_measured=0.5, paired=True, nodes=1):
+    """Draw a study of one number, or of as many as `nodes`: athletes differ by sd 2, and in their effect."""
+    values, rows = [], []
     for athlete in range(athletes):
-        level, own = rng.normal(0, 2), effect + rng.normal(0, sd_effect)
+        level, own = rng.normal(0, 2, nodes), effect + rng.normal(0, sd_effect, nodes)
         for condition in (0, 1) if paired else (athlete % 2,):
             n = trials if isinstance(trials, int) else rng.integers(*trials)
-            values = level + own * condition + rng.normal(0, np.hypot(sd_trial, sd_measured), n)
-            rows += [(value, athlete, condition) for value in values]
-    values, athlete, condition = (np.array(column) for column in zip(*rows, strict=True))
-    variance = np.full((len(values), 1), sd_measured**2)
-    return Cells(values=values[:, None], variance=variance, athlete=athlete, condition=condition)
+            values.append(level + own * condition + rng.normal(0, np.hypot(sd_trial, sd_measured), (n, nodes)))
+            rows += [(athlete, condition)] * n
+    athlete, condition = np.array(rows).T
+    drawn = np.concatenate(values)
+    return Cells(values=drawn, variance=np.full_like(drawn, sd_measured**2), athlete=athlete, condition=condition)
 
 
 def means_of(cells, condition):
@@ -96,10 +96,10 @@ def test_without_repeated_trials_the_measurement_alone_is_known():
 @pytest.mark.parametrize("options", [{}, {"trials": (2, 7)}, {"athletes": 16, "paired": False}])
 def test_intervals_hold_the_truth_as_often_as_they_say(options):
     rng, covered, alarms = np.random.default_rng(8), 0, 0
-    for _ in range(RUNS):
-        found = estimate_difference(draw(rng, **options), 0, 1)
-        covered += found.low[0] <= 1.0 <= found.high[0]
-        alarms += estimate_difference(draw(rng, effect=0.0, **options), 0, 1).p[0] < 0.05
+    for _ in range(RUNS // NODES):
+        found = estimate_difference(draw(rng, nodes=NODES, **options), 0, 1)
+        covered += np.sum((found.low <= 1.0) & (found.high >= 1.0))
+        alarms += np.sum(estimate_difference(draw(rng, effect=0.0, nodes=NODES, **options), 0, 1).p < 0.05)
     error = 3 * np.sqrt(0.05 * 0.95 / RUNS)
     np.testing.assert_allclose([covered / RUNS, alarms / RUNS], [0.95, 0.05], atol=error)
 

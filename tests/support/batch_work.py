@@ -1,14 +1,26 @@
-"""Work of a batch that needs no trial: done by workers in place of tracking."""
+"""Batches without workers, and work that needs no trial: done by workers in place of tracking."""
 
 import os
 import signal
 import time
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
-from airborne.batch.task import Task, TaskOutcome
+from airborne.batch.task import Task, TaskOutcome, do_task
 from airborne.batch.trials import BatchTrial
 
 SLEEP_S = 0.02
+
+
+def work_here(patch) -> None:
+    """Let a batch do its tasks one after the other in this process, as a worker would."""
+    client = SimpleNamespace(dashboard_link="none", scheduler_info=lambda: {"workers": {"here": {}}})
+    patch.setattr("airborne.batch.run.import_for_workers", lambda: None)
+    patch.setattr("airborne.batch.run.open_client", lambda *_: nullcontext(client))
+    patch.setattr(
+        "airborne.batch.run.do_tasks", lambda client, tasks, *, report: (do_task(each, report) for each in tasks)
+    )
 
 
 def tasks(folder: Path, n: int):

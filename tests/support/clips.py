@@ -58,10 +58,11 @@ def write_clip(
     time_base: Fraction | None = None,
     rotation_deg: int = 0,
     options: dict[str, str] | None = None,
+    index_first: bool = True,
 ) -> Path:
     """Write pictures (arrays or frames); without loss unless another codec is asked for."""
-    index_first = {"movflags": "faststart"} if path.suffix == ".mp4" else {}
-    with av.open(path, "w", options=index_first) as container:
+    layout = {"movflags": "faststart"} if path.suffix == ".mp4" and index_first else {}
+    with av.open(path, "w", options=layout) as container:
         stream = container.add_stream(codec, rate=rate, options=options or {})
         if time_base is not None:
             stream.codec_context.time_base = time_base

@@ -25,7 +25,7 @@ FIELD_S = 0.02
 
 @pytest.fixture
 def trial(tmp_path) -> Path:
-    return copy_cross(tmp_path / "thrown") / "trial.toml"
+    return copy_cross(tmp_path / "thrown", is_light=False) / "trial.toml"
 
 
 def offsets(offset_s, sd_s=(0, 0.001, 0.002), drift=(0, 0, 0)) -> Offsets:

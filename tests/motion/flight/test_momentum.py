@@ -216,7 +216,8 @@ def test_momentum_deviations_are_those_of_sampled_inertias():
     limbs = [replace(segment, name=name, parent="trunk") for segment, name in named]
     model = replace(MODEL, segments=(trunk, *limbs), landmarks=())
     rng, n, sd = np.random.default_rng(6), 400, 0.1
-    motion = motion_of(model, swinging(model, np.arange(5) / 50), covariance=1e-16 * np.eye(model.n_dofs))
+    poses = swinging(model, np.arange(5) / 50)
+    motion, without_sd = (motion_of(model, poses, covariance=each) for each in (1e-16 * np.eye(model.n_dofs), None))
 
     def sample():
         kinds = 1 + sd * rng.standard_normal(4)[[0, 1, 1, 2, 3]]  # both arms are wrong alike
@@ -227,7 +228,7 @@ def test_momentum_deviations_are_those_of_sampled_inertias():
             for f, own in zip(factors, (each.inertia for each in model.segments), strict=True)
         ]
         changed = [replace(each, inertia=own) for each, own in zip(model.segments, inertias, strict=True)]
-        return angular_momenta(motion, replace(model, segments=tuple(changed)))[0]
+        return angular_momenta(without_sd, replace(model, segments=tuple(changed)))[0]
 
     stated = np.sqrt(angular_momenta(motion, model, inertia_sd=sd)[1])
     np.testing.assert_allclose(stated, np.std([sample() for _ in range(n)], axis=0), rtol=sampled(n) + sd)

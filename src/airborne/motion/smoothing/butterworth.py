@@ -9,6 +9,8 @@ actually 4.8 Hz.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
@@ -49,9 +51,9 @@ def low_pass(values: Array, *, cutoff_hz: float, rate_hz: float) -> Array:
     that the parabola makes no difference away from the ends, and free fall is preserved up to the ends. Raises
     ResultError for a cut-off not below half the rate.
     """
-    from scipy.signal import butter, sosfiltfilt  # takes a third of a second to load
+    from scipy.signal import sosfiltfilt  # takes a third of a second to load
 
-    sections = butter(_ORDER, pass_cutoff_hz(cutoff_hz, rate_hz), fs=rate_hz, output="sos")
+    sections = _sections(cutoff_hz, rate_hz)
     u = np.linspace(-1, 1, len(values))
     terms = np.vander(u, min(3, len(values)))
     flat = values.reshape(len(values), -1)
@@ -59,6 +61,14 @@ def low_pass(values: Array, *, cutoff_hz: float, rate_hz: float) -> Array:
     n_padding = min(round(rate_hz / cutoff_hz), len(values) - 1)
     filtered = sosfiltfilt(sections, flat - parabola, axis=0, padtype="odd", padlen=n_padding)
     return np.asarray(filtered + parabola).reshape(values.shape)
+
+
+@lru_cache(maxsize=256)  # a residual analysis filters every path at the same cut-offs
+def _sections(cutoff_hz: float, rate_hz: float) -> Array:
+    """Return the second-order sections of each pass."""
+    from scipy.signal import butter
+
+    return butter(_ORDER, pass_cutoff_hz(cutoff_hz, rate_hz), fs=rate_hz, output="sos")
 
 
 def is_evenly_sampled(time_s: Array) -> bool:
