@@ -1,5 +1,6 @@
 """The fit of a person's whole run: joints err less than frame by frame, in windows too; keys and unknowns stay."""
 
+import re
 import shutil
 from dataclasses import replace
 from functools import cached_property
@@ -42,12 +43,20 @@ def scene_of(target):
     return replace(scene, rig=Rig(tuple(cameras)), n_pictures=N)
 
 
+def forget_lights(file):
+    """Let a trial's lights be unknown, as where nobody measured them."""
+    text = file.read_text(encoding="utf-8")
+    file.write_text(re.sub(r"(?s)\n\[lights\].*?(?=\n\[(?!\[?lights))", "", text), encoding="utf-8")
+    assert read_trial(file).lights is None
+
+
 class TrackedRun:
     """A trial, its true flight, and estimates whose poses are a little wrong in every frame."""
 
     def __init__(self, scene, folder):
         write_trial(scene, folder)
         self.file, self.model = folder / "trial.toml", scene.model
+        forget_lights(self.file)
         self.trial = read_trial(self.file)
         self.true = scene.flight(np.array([float(scene.time_s(k)) for k in range(N)]))
         rng, self.sd = np.random.default_rng(4), np.repeat([OFF_M, OFF_RAD], [3, self.model.n_dofs - 3])
