@@ -102,8 +102,10 @@ def pytest_terminal_summary(terminalreporter, config):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _foregrounds():
+def _known():
+    """What is the same for all tests is found once; files need not outlast a power cut."""
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda _: None)
         remember_foregrounds(patch)
         remember_silhouettes(patch)
         yield
