@@ -18,8 +18,7 @@ SIZES = ((1024, 700), (3840, 2160))  # of the window, the smallest and the large
 HAS_GROWN = """height => [...document.querySelectorAll(".q-layout, .q-page")].every(
     (each) => parseFloat(each.style.minHeight) === height
 )"""  # Quasar gives these the height of the window, a moment after it has it: on a busy machine a later one
-IS_STILL = """!document.querySelector(".q-notification") && // those, and the bar of what is loaded, fade in and out
-    [...document.querySelectorAll(".q-loading-bar")].every((each) => each.style.opacity === "0")"""
+IS_STILL = "!document.querySelector('.q-notification')"  # those fade in and out
 END_ANIMATIONS = """Promise.allSettled(document.getAnimations().map(
     async (each) => each.effect.getComputedTiming().endTime < Infinity ? each.finish() : each.finished
 ))"""

@@ -113,6 +113,7 @@ def _serve(session: Session, port: int, token: str, *, browser: bool) -> None:
             webbrowser.open(address)
         session.pictures.prefetch.start()
 
+    app.config.quasar_config["loadingBar"]["skipHijack"] = True  # it has no name; what takes long says so itself
     binding.MAX_PROPAGATION_TIME = math.inf  # [s]; beyond it NiceGUI writes a line for developers to the terminal
     app.on_startup(announce)
     app.on_shutdown(session.pictures.prefetch.close)
