@@ -182,7 +182,7 @@ def _remembering_finder(board: Board, find: Detector, memory: Memory) -> Detecto
     pattern = replace(board, is_inverted=False, is_two_sided=False, thickness_m=0.0)  # all that `find` depends on
 
     def remember(grey: NDArray[np.uint8]) -> DetectedCorners:
-        contents = hashlib.blake2b(np.ascontiguousarray(grey)).digest() + repr(grey.shape).encode()
+        contents = hashlib.blake2b(np.ascontiguousarray(grey).data).digest() + repr(grey.shape).encode()
         if (pattern, contents) not in memory:
             memory[pattern, contents] = find(grey)
         return memory[pattern, contents]
