@@ -136,7 +136,7 @@ def _row_interval(top, bottom, y):
     return top if y - 1 < top else y - 0.5, bottom if y + 1 > bottom else y + 0.5
 
 
-@kernel(inline="always")
+@kernel
 def _edge_derivative(discs, tangents, who, piece, y, outward):
     """Differentiate an end of a span of capsule `who` by its discs: (x0, x1, t, by_y, by_r).
 
@@ -160,7 +160,7 @@ def _edge_derivative(discs, tangents, who, piece, y, outward):
     return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), by_r
 
 
-@kernel(inline="always")
+@kernel
 def _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvature):
     """Add the derivatives at the end of a span by its capsule's discs; ox is the region's first column.
 
@@ -182,7 +182,7 @@ def _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvatu
     _accumulate(1.0, by_y, by_r, t, value, facing, gradient[who], curvature[who])
 
 
-@kernel(inline="always")
+@kernel
 def _accumulate(by_x, by_y, by_r, t, value, facing, gradient, curvature):
     """Add an edge with derivatives by_x, by_y, by_r by x, y, radius: 1 - t of disc a, t of b; `value`: its gain."""
     of_a, of_b, by = 1 - t, t, (by_x, by_y, by_r)
