@@ -63,7 +63,7 @@ def find_misplaced_limbs(
         other[row] = np.bincount(owner, probability < _SURELY_OTHER, minlength=n)
     precision, is_shown = inside.sum() / max(pixels.sum(), 1), pixels >= _FEWEST_PX
     is_misplaced = is_shown & (other > _MISPLACED * pixels)
-    is_suspect = is_misplaced | is_shown & (inside < _SUSPECT * precision * pixels)
+    is_suspect = is_shown & (inside < _SUSPECT * precision * pixels)
     return LimbFaults(*(_limbs_with(render_model.model, each) for each in (is_suspect, is_misplaced)))
 
 
