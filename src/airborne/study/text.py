@@ -112,14 +112,15 @@ def _results(comparison: VariableComparison) -> list[str]:
         _number(each, comparison) if comparison.axis is None else _curve(each, comparison)
         for each in comparison.contrasts
     ]
-    typical = [float(np.median(each)) for each in (spread.sd_within, spread.sd_measurement, spread.mdc)]
-    within, measured, mdc = (format_digits(each, 3) for each in typical)
+    sds = [float(np.median(each)) for each in (spread.sd_within, spread.sd_measurement, spread.mdc)]
+    is_repeated, is_stated = not np.isnan(sds[0]), bool(sds[1])
+    within, measured, mdc = (format_digits(each, 3) for each in sds)
     over = "" if comparison.axis is None else ", median over the curve,"
     stated = "the runs state none for the measurement"
-    if typical[1]:
+    if is_stated:
         stated = f"the runs state {measured} for the measurement, errors included that trials share"
-    if np.isnan(typical[0]):
-        return [*sentences, f"{_NOT_REPEATED} ({stated}{over.removesuffix(',') if typical[1] else ''})."]
+    if not is_repeated:
+        return [*sentences, f"{_NOT_REPEATED} ({stated}{over.removesuffix(',') if is_stated else ''})."]
     sentences.append(
         f"standard deviation between trials of one athlete and condition{over} {within} ({stated}); "
         f"minimal detectable change of a trial {mdc}."
