@@ -305,7 +305,8 @@ def test_every_file_of_a_body_with_joints_is_documented(person, run):
     left = set(files_of(person[0])) - set(files_of(run))
     rows = table_of(RESULTS, "Files of a body with joints")
     covariances = {covariance_file.COVARIANCE_FILE, f"{TABLES}/{covariance_file.COVARIANCE_FILE}"}
-    assert left | covariances | {TRACKED_MOTION} == {name for row in rows for name in named(row[0])}
+    of_whole_run = {TRACKED_MOTION, covariance_file.FRAME_SD_FILE}
+    assert left | covariances | of_whole_run == {name for row in rows for name in named(row[0])}
 
 
 @pytest.mark.parametrize("name", ["joint_angles.csv", "flight.csv"])

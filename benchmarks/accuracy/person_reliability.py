@@ -4,7 +4,7 @@ The two somersaults of `../shared/data` (`--data FOLDER` for another place), tra
 and after the fit of the whole run, and the synthetic somersault with a smooth skin, frame by frame. Of each: the mean
 joint error, without each joint's constant offset (two definitions of a joint), the largest; joints that are called
 tracked and are more than 100 mm off; the reliability diagram, stated against found coverage, and its ECE, also by the
-deviations of single frames, without what lasts all run long. Of the fitted somersaults also the flight: centre of mass,
+deviations of what changes from frame to frame. Of the fitted somersaults also the flight: centre of mass,
 gravity, angular momentum and turns. About 3 minutes. `--quick` tracks 12 frames of the
 synthetic one and writes no rows. The trackers see no truth.
 """

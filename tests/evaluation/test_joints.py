@@ -61,7 +61,7 @@ def test_smoothed_joints_take_the_places_of_the_tracked_ones_and_their_deviation
         smooth, names=MARKS[::-1], points=smooth.points[:, ::-1], sd=np.full(smooth.points.shape[:2], np.inf)
     )
     assert compare_joints(run(), MODEL, paths(), reordered).whole == result.whole
-    assert "single frames" not in result.describe()
+    assert "from frame to frame" not in result.describe()
 
 
 @pytest.mark.parametrize("other", [{"names": ("a", *MARKS[1:])}, {"time_s": TIMES + 1}, {"time_s": TIMES[:-1]}])
@@ -182,7 +182,7 @@ def test_deviations_of_single_frames_leave_out_what_lasts():
     )
     assert result.coverage.within_50 > 0.99
     assert result.coverage_by_frame.within_80 == pytest.approx(0.8, abs=sampled(result.coverage_by_frame.n))
-    assert "single frames" in result.describe()
+    assert "from frame to frame" in result.describe()
 
 
 def test_numbers_go_to_json_without_nan():

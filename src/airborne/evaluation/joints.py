@@ -21,6 +21,7 @@ from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.evaluation.mix_ups import Paths, question_mix_up
 from airborne.evaluation.times import best_time_shift, match_times, span
 from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
+from airborne.motion.joints import landmark_frame_sds
 from airborne.tracking import Status
 from airborne.types import Array, Triple
 
@@ -62,7 +63,7 @@ class JointComparison:
     calibration: SdCalibration  # errors against the landmarks' reported deviations
     coverage_with_offset: Coverage  # of those errors
     coverage: Coverage  # the same without each landmark's constant offset in its segment
-    coverage_by_frame: Coverage  # of those errors by the deviations of single frames, without what lasts all run long
+    coverage_by_frame: Coverage  # of those errors by the deviations of what changes from frame to frame
     better_shift_s: float  # added to the reference's times, this would clearly agree better; whole periods, or 0
     better_mean_without_offset_mm: float  # the error with that shift
     mix_up: str  # a question about unit, axes, sides or times where these explain why the reference is far; else ""
@@ -103,7 +104,7 @@ class JointComparison:
             lines.append(self.coverage.describe("errors without offset"))
         if self.coverage_by_frame.n:
             by_frame = self.coverage_by_frame.describe("errors without offset")
-            lines.append(f"by the deviations of single frames, without lasting ones: {by_frame}")
+            lines.append(f"by deviations of what changes from frame to frame: {by_frame}")
         lines.append(f"joints tracked: {self.share_tracked:.0%}; of these more than 100 mm off: {self.n_far}")
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")
@@ -148,7 +149,7 @@ def compare_joints(
     joint_status = joint_statuses(motion, model, all_sd)[:, columns]
     measured, sd = points[:, columns], all_sd[:, columns]
     if smooth is None:
-        sd_by_frame = landmarks(replace(motion, lasting=None), model)[1][:, columns]
+        sd_by_frame = landmark_frame_sds(motion, model)[:, columns]
     else:
         measured, sd = _match_smooth(motion, smooth, names)
         sd_by_frame = np.full(sd.shape, np.nan)  # they are not told apart

@@ -26,7 +26,9 @@ from airborne.motion.covariance_file import (
     LASTING_FILE,
     CovarianceWriter,
     read_covariances,
+    read_frame_sds,
     write_covariances,
+    write_frame_sds,
 )
 from airborne.motion.motion import Motion, rigid_transform
 from airborne.motion.tables import cell, motion_columns
@@ -56,8 +58,7 @@ class MotionWriter:
         if file_joints != joints:
             listed = ", ".join(joints) or "none"
             raise ResultError(f"{path} was written for another body; joints here: {listed}; start in a new folder")
-        self._path, self._joints = path, joints
-        self._covariances = None
+        self._path, self._joints, self._covariances = path, joints, None
         if joints:
             past = Motion.collect(estimates, joints).covariance
             self._covariances = CovarianceWriter(path.with_name(COVARIANCE_FILE), list(past), size=past.shape[-1])
@@ -103,8 +104,9 @@ def read_estimates(path: Path) -> list[Estimate]:
 def read_motion(path: Path) -> Motion:
     """Read motion.csv as a `Motion`, with the lasting errors beside it; the rules are those of `read_estimates`."""
     joints, estimates = _parse(path)
+    lasting = read_covariances(path.with_name(LASTING_FILE), len(estimates), size=6)
     motion = Motion.collect(sorted(estimates, key=lambda estimate: estimate.index), joints)
-    lasting = read_covariances(path.with_name(LASTING_FILE), len(motion), size=6)
+    motion = replace(motion, landmark_frame_sd=read_frame_sds(path, len(motion)))
     return motion if np.isnan(lasting).any() else replace(motion, lasting=lasting)
 
 
@@ -118,6 +120,7 @@ def revise_motion(path: Path, motion: Motion) -> None:
     lines = [header, *map(",".join, _cells(motion, [line.split(",")[exact] for line in rows]))]
     if motion.lasting is not None:
         write_covariances(path.with_name(LASTING_FILE), motion.lasting)
+    write_frame_sds(path, motion.landmark_frame_sd)
     unfinished = path.with_name(path.name + ".part")
     unfinished.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     if motion.joints:

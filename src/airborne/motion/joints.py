@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.body import BodyModel
+from airborne.body import BodyModel, PosedBody
 from airborne.body.chain import nearest_angles, point_jacobian
 from airborne.body.shaping import half_widths_m
 from airborne.body.sides import are_crossed, paired_legs
@@ -66,20 +67,51 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     direction moves it, NaN where unknown. Raises ResultError for another body.
     """
     require_body(motion, model)
-    owners = _owners(model)
-    points = np.full((len(motion), len(owners), 3), np.nan)
-    variance, at_joint = np.full(points.shape, np.nan), _at_joint(model)
-    covariance = motion.total_covariance
+    points = np.full((len(motion), len(model.landmarks), 3), np.nan)
     for row in np.flatnonzero(motion.has_pose):
-        posed = model.with_pose(motion.pose(row))
-        points[row] = posed.landmarks
-        moved = np.where(at_joint[:, None], posed.t[owners], points[row])
-        variance[row] = propagate_variances(point_jacobian(posed, owners, moved), covariance[row])
-    return points, standard_deviation(variance.mean(axis=-1) + _place_variance(model, owners))
+        points[row] = model.with_pose(motion.pose(row)).landmarks
+    variance = landmark_variances(motion, model, motion.total_covariance)
+    return points, standard_deviation(variance + _place_variance(model))
 
 
-def _place_variance(model: BodyModel, owners: NDArray[np.int64]) -> Array:
+def landmark_frame_sds(motion: Motion, model: BodyModel) -> Array:
+    """Return the sd of those errors of the landmarks that change from frame to frame: (n, landmarks) [m].
+
+    After the fit of a whole run, without what is constant in each one's segment; else without the root's lasting errors
+    alone. Raises ResultError for another body.
+    """
+    if motion.landmark_frame_sd is not None:
+        return motion.landmark_frame_sd
+    return landmarks(replace(motion, lasting=None), model)[1]
+
+
+def landmark_variances(motion: Motion, model: BodyModel, covariance: Array) -> Array:
+    """Return the landmarks' variances, means over the axes, by covariances (n, d, d) of the poses: (n, landmarks)."""
+    variance = np.full((len(motion), len(model.landmarks), 3), np.nan)
+    for row in np.flatnonzero(motion.has_pose):
+        jacobian = landmark_jacobian(model.with_pose(motion.pose(row)))
+        variance[row] = propagate_variances(jacobian, covariance[row])
+    return np.asarray(variance.mean(axis=-1))
+
+
+def landmark_jacobian(posed: PosedBody) -> Array:
+    """Differentiate a body's landmarks, or the joints that they stand for, by its pose: (landmarks, 3, d)."""
+    owners = landmark_owners(posed.model)
+    moved = np.where(_at_joint(posed.model)[:, None], posed.t[owners], posed.landmarks)
+    return point_jacobian(posed, owners, moved)
+
+
+def turning_place_variance(model: BodyModel) -> Array:
+    """Return the variance of each landmark's place that turns against its own segment: (landmarks,) [m2].
+
+    A joint lies beside its place within both its segments, alike: half of the variance is the parent's.
+    """
+    return np.where(_carriers(model) == landmark_owners(model), 0.0, _place_variance(model) / 2)
+
+
+def _place_variance(model: BodyModel) -> Array:
     """Return the variance of each landmark's place within its segment, a joint's within both: (landmarks,) [m2]."""
+    owners = landmark_owners(model)
     if not model.has_joints:
         return np.zeros(len(owners))
     sds = PLACE_SHARE * half_widths_m(model)
@@ -94,7 +126,7 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
     and crossed legs that fewer than three cameras show make theirs.
     """
     status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
-    owners = _owners(model)
+    owners = landmark_owners(model)
     is_doubtful = ~(sd <= UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)] | _may_swap(motion, model)
     is_doubtful |= np.pad(motion.uncertain_joints, ((0, 0), (1, 0)))[:, owners]
     status[(status == JointStatus.TRACKED.value) & is_doubtful] = JointStatus.UNCERTAIN.value
@@ -132,11 +164,11 @@ def count_statuses(status: NDArray[np.str_], model: BodyModel) -> dict[str, dict
 
 def _carriers(model: BodyModel) -> NDArray[np.int64]:
     """Return the segment whose joint moves each landmark, the parent of a segment for its origin: (landmarks,)."""
-    owners = _owners(model)
+    owners = landmark_owners(model)
     return np.where(_at_joint(model) & (owners > 0), model.parents[owners], owners)
 
 
-def _owners(model: BodyModel) -> NDArray[np.int64]:
+def landmark_owners(model: BodyModel) -> NDArray[np.int64]:
     """Return the segment of each landmark: (landmarks,)."""
     return np.array([model.index_of(landmark.segment) for landmark in model.landmarks], np.int64)
 
@@ -162,7 +194,7 @@ def _may_swap(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     rows, crossed = np.flatnonzero(motion.has_pose & (motion.n_views < _SURE_VIEWS)), np.zeros(len(motion), np.bool_)
     joints_m = model.pose_segments(motion.R[rows], motion.position[rows], motion.joint_angles[rows])[1]
     crossed[rows] = are_crossed(model, joints_m)
-    owners = _owners(model)
+    owners = landmark_owners(model)
     return crossed[:, None] & np.isin(owners, [segment for legs in paired_legs(model) for segment in legs.ravel()])
 
 

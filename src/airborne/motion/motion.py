@@ -39,6 +39,7 @@ class Motion:
     doubts: NDArray[np.str_]  # (n,) why frames are uncertain: values of `Doubt`, separated by slashes; "" for others
     uncertain_joints: NDArray[np.bool_]  # (n, joints) that may be elsewhere, whatever the covariance says
     lasting: Array | None = None  # (n, 6, 6) of the root's errors that last, or make its path rough
+    landmark_frame_sd: Array | None = None  # (n, landmarks) [m] of errors that change by frame, of a fitted run
 
     @classmethod
     def collect(cls, estimates: Sequence[Estimate], joints: tuple[str, ...] = ()) -> Motion:

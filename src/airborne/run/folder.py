@@ -19,7 +19,7 @@ from airborne.export import write_json
 from airborne.io.files import file_digest
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
 from airborne.motion import drop_rows
-from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
+from airborne.motion.covariance_file import COVARIANCE_FILE, FRAME_SD_FILE, LASTING_FILE
 from airborne.motion.files import copy_motion, remove_motion
 from airborne.motion.run_folder import (
     AGREEMENT,
@@ -185,8 +185,8 @@ def _remove_run(folder: Path) -> None:
     """Remove what commands leave in a run's folder; exports and what others put there stay."""
     _remove_made(folder)
     shutil.rmtree(folder / TABLES, ignore_errors=True)
-    made = (MOTION, JOINTS, JUMPS, SUMMARY, CALIBRATION, BODY, COVARIANCE_FILE, LASTING_FILE, *_BEFORE_A_RUN)
-    for name in (*made, RUN_RECORD):
+    made = (MOTION, JOINTS, JUMPS, SUMMARY, CALIBRATION, BODY, COVARIANCE_FILE, LASTING_FILE, FRAME_SD_FILE)
+    for name in (*made, *_BEFORE_A_RUN, RUN_RECORD):
         (folder / name).unlink(missing_ok=True)
 
 

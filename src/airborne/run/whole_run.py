@@ -22,9 +22,10 @@ from airborne.motion import Motion
 from airborne.motion.flight.momentum_table import falls_freely
 from airborne.motion.flight.phases import body_events
 from airborne.motion.joints import doubtful_segments
+from airborne.motion.smoothing.frame_errors import ConstantOffsets, constant_offsets, frame_deviations
 from airborne.motion.smoothing.lost_limbs import bridge_lost_limbs
 from airborne.motion.smoothing.moved_joints import count_moves_as_errors, forget_moved_limbs
-from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run, invert_known, smooth_covariances
+from airborne.motion.smoothing.run_fit import N_STEPS, Stretch, fit_run, invert_known, smooth_errors
 from airborne.motion.smoothing.segments import segment_numbers, stretches
 from airborne.tracking import Estimate, Status
 from airborne.tracking.methods import Settings, tracker_of
@@ -80,6 +81,7 @@ def fit_whole_run(
     position, R, angles, covariance = (
         each.copy() for each in (motion.position, motion.R, motion.joint_angles, motion.covariance)
     )
+    offsets = list[ConstantOffsets]()
     for window in windows:
         rows, time_s = window.rows, motion.time_s[window.rows]
         poses = [motion.pose(row) for row in rows]
@@ -88,13 +90,15 @@ def fit_whole_run(
         look = _Look(images, window, shown[rows])
         fit = fit_run(model, poses, time_s, window.stretches, look, n_steps=images.n_steps)
         own = images.assess(fit.poses, window, motion)
-        covariances = smooth_covariances(model, fit, time_s, window.stretches, own)
-        for row, pose, each in list(zip(rows, fit.poses, covariances, strict=True))[window.kept]:
+        errors = smooth_errors(model, fit, time_s, window.stretches, own)
+        offsets.append(constant_offsets(model, rows, fit.poses, errors, window.kept))
+        for row, pose, each in list(zip(rows, fit.poses, errors.covariances, strict=True))[window.kept]:
             matrix = pose.world_from_root.as_matrix()
             position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
             covariance[row] = each
     fitted = replace(motion, position=position, R=R, joint_angles=angles, covariance=covariance)
     fitted = count_moves_as_errors(model, motion, forget_moved_limbs(model, motion, fitted))
+    fitted = replace(fitted, landmark_frame_sd=frame_deviations(fitted, model, offsets))
     return FittedRun(fitted, "skin" if images.is_skin else "ellipsoids")
 
 

@@ -14,7 +14,7 @@ from airborne.motion.smoothing.run_fit import (
     fall_offset_m,
     fall_rows,
     fit_run,
-    smooth_covariances,
+    smooth_errors,
 )
 from airborne.synthetic.flight.articulated import Takeoff, fly_articulated, joint_motion
 from airborne.tracking.model_based.image_evidence import ImageEvidence
@@ -174,7 +174,7 @@ def test_covariances_hold_the_errors_that_smooth_motion_leaves(falls):
     for seed in range(n_runs):
         fit = fit_run(HUMAN, TRUTH, TIME_S, stretches, seen(shake(TRUTH, sd, seed)))
         silent = [replace(each, of_shape=0 * each.of_shape) for each in fit.evidence]
-        left = smooth_covariances(HUMAN, fit._replace(evidence=silent), TIME_S, stretches, covariances)
+        left = smooth_errors(HUMAN, fit._replace(evidence=silent), TIME_S, stretches, covariances).covariances
         errors = np.array([delta_between(true, pose) for true, pose in zip(TRUTH, fit.poses, strict=True)])
         shares.append(np.mean(errors**2 / np.diagonal(left, axis1=1, axis2=2)))
         assert (np.diagonal(left, axis1=1, axis2=2) < 0.9 * sd**2).all()
@@ -189,8 +189,8 @@ def test_errors_of_the_surface_pass_the_fit_as_they_are_and_open_directions_stay
         [Stretch(slice(0, 20), False)],
     )
     silent = fit._replace(evidence=[replace(each, of_shape=0 * each.of_shape) for each in fit.evidence])
-    both = smooth_covariances(HUMAN, fit, TIME_S, stretches, covariances)
-    without = smooth_covariances(HUMAN, silent, TIME_S, stretches, covariances)
+    both = smooth_errors(HUMAN, fit, TIME_S, stretches, covariances).covariances
+    without = smooth_errors(HUMAN, silent, TIME_S, stretches, covariances).covariances
     added = np.diagonal(both[:20, :3, :3] - without[:20, :3, :3], axis1=1, axis2=2)
     np.testing.assert_allclose(added, SURFACE_M**2, rtol=0.05)
     assert np.argwhere(np.isinf(np.diagonal(both, axis1=1, axis2=2))).tolist() == [[5, 20]]

@@ -57,6 +57,13 @@ class Stretch:
     falls: bool
 
 
+class SmoothErrors(NamedTuple):
+    """The errors of the poses of a fitted run."""
+
+    covariances: Array  # (n, d, d)
+    of_surface: Array  # (n, d, k) what errors of the surface of an sd each, which last all run long, do to the poses
+
+
 class RunFit(NamedTuple):
     """The most probable poses of a run, and what its images said about those before the last step."""
 
@@ -87,15 +94,15 @@ def fit_run(
     return RunFit(best.poses if descent.n_losses else best.step(1.0)[0], best.evidence)
 
 
-def smooth_covariances(
+def smooth_errors(
     model: BodyModel, fit: RunFit, time_s: Array, stretches: Sequence[Stretch], covariances: Array
-) -> Array:
-    """Return the covariances of the poses of a fitted run, from those of its frames by themselves: (n, d, d).
+) -> SmoothErrors:
+    """Return the errors of the poses of a fitted run, from the covariances of its frames by themselves: (n, d, d).
 
     To smooth motion the errors of single frames are noise, of which it leaves little. Errors of the surface last all
     run long: they pass the fit as they are, and are added. A direction that a frame leaves open stays open.
     """
-    fitted = covariances.copy()
+    fitted, of_surface = covariances.copy(), np.zeros((*covariances.shape[:2], len(fit.evidence[0].of_shape)))
     for stretch in stretches:
         rows, damping = stretch.rows, _DAMPING * np.eye(model.n_dofs)
         joining = _joining_rows(model, fit.poses, time_s, stretch)
@@ -103,9 +110,9 @@ def smooth_covariances(
         left = BandedEquations.of(own, np.zeros(own.shape[:2]), *joining).covariances()
         own = np.array([each.information + damping for each in fit.evidence[rows]])
         of_shape = np.array([each.of_shape.T for each in fit.evidence[rows]])
-        moved = BandedEquations.of(own, np.zeros(own.shape[:2]), *joining).solve(of_shape)
+        of_surface[rows] = moved = BandedEquations.of(own, np.zeros(own.shape[:2]), *joining).solve(of_shape)
         fitted[rows] = np.where(np.isfinite(covariances[rows]), left + moved @ moved.swapaxes(1, 2), covariances[rows])
-    return fitted
+    return SmoothErrors(fitted, of_surface)
 
 
 def invert_known(covariance: Array) -> Array:
