@@ -68,10 +68,11 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     """
     require_body(motion, model)
     points = np.full((len(motion), len(model.landmarks), 3), np.nan)
+    variance, covariance = np.full(points.shape, np.nan), motion.total_covariance
     for row in np.flatnonzero(motion.has_pose):
-        points[row] = model.with_pose(motion.pose(row)).landmarks
-    variance = landmark_variances(motion, model, motion.total_covariance)
-    return points, standard_deviation(variance + _place_variance(model))
+        posed = model.with_pose(motion.pose(row))
+        points[row], variance[row] = posed.landmarks, propagate_variances(landmark_jacobian(posed), covariance[row])
+    return points, standard_deviation(variance.mean(axis=-1) + _place_variance(model))
 
 
 def landmark_frame_sds(motion: Motion, model: BodyModel) -> Array:
@@ -85,28 +86,11 @@ def landmark_frame_sds(motion: Motion, model: BodyModel) -> Array:
     return landmarks(replace(motion, lasting=None), model)[1]
 
 
-def landmark_variances(motion: Motion, model: BodyModel, covariance: Array) -> Array:
-    """Return the landmarks' variances, means over the axes, by covariances (n, d, d) of the poses: (n, landmarks)."""
-    variance = np.full((len(motion), len(model.landmarks), 3), np.nan)
-    for row in np.flatnonzero(motion.has_pose):
-        jacobian = landmark_jacobian(model.with_pose(motion.pose(row)))
-        variance[row] = propagate_variances(jacobian, covariance[row])
-    return np.asarray(variance.mean(axis=-1))
-
-
 def landmark_jacobian(posed: PosedBody) -> Array:
     """Differentiate a body's landmarks, or the joints that they stand for, by its pose: (landmarks, 3, d)."""
     owners = landmark_owners(posed.model)
     moved = np.where(_at_joint(posed.model)[:, None], posed.t[owners], posed.landmarks)
     return point_jacobian(posed, owners, moved)
-
-
-def turning_place_variance(model: BodyModel) -> Array:
-    """Return the variance of each landmark's place that turns against its own segment: (landmarks,) [m2].
-
-    A joint lies beside its place within both its segments, alike: half of the variance is the parent's.
-    """
-    return np.where(_carriers(model) == landmark_owners(model), 0.0, _place_variance(model) / 2)
 
 
 def _place_variance(model: BodyModel) -> Array:

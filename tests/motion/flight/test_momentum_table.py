@@ -11,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import Pose
 from airborne.errors import BodyError, ResultError
 from airborne.motion import flight_summary, has_inertias, measure_flight, write_flight
+from airborne.motion.flight.fall import fit_fall
 from airborne.motion.flight.momentum import centre_of_mass
 from airborne.motion.flight.momentum_table import _fit_parabola, state_centres_of_mass, widen_momentum
 from airborne.tracking.self_check.free_flight import WrongFall
@@ -126,9 +127,19 @@ def test_deviation_of_the_fitted_gravity_is_that_of_paths_whose_errors_resemble_
     rng, time_s, n = np.random.default_rng(5), np.arange(80) / 60, 300
     error = lfilter([1.0], [1.0, -0.7], 0.003 * rng.normal(size=(n, len(time_s))), axis=1)
     paths = np.stack([np.zeros_like(error), np.zeros_like(error), error - 9.81 / 2 * time_s**2], axis=-1)
-    gravity, sd, _ = np.transpose([_fit_parabola(time_s, path, np.tile(np.eye(3), (80, 1, 1))) for path in paths])
+    falls = [fit_fall(time_s, path, np.tile(np.eye(3), (80, 1, 1))) for path in paths]
+    gravity, sd = np.transpose([(fall.gravity_m_s2, fall.gravity_sd_m_s2) for fall in falls])
     assert np.median(sd) == pytest.approx(np.std(gravity), rel=sampled(n))
     assert np.mean(np.abs(gravity - 9.81) < 2 * sd) > 0.88
+
+
+@pytest.mark.parametrize("duration_s", [0.5, 1.0, 1.5])
+def test_a_centre_of_mass_that_wanders_a_centimetre_changes_gravity_by_its_deviation(duration_s):
+    time_s = np.linspace(0, duration_s, 60)
+    wanders = 0.01 * (2 * time_s / duration_s - 1) ** 2  # and comes back
+    path = np.stack([0 * time_s, time_s, wanders - 9.81 / 2 * time_s**2], axis=-1)
+    gravity, sd, _ = _fit_parabola(time_s, path, np.tile(np.eye(3), (60, 1, 1)))
+    assert abs(gravity - 9.81) == pytest.approx(sd, rel=1e-3)
 
 
 def heavier_behind(model, offset_m):

@@ -66,11 +66,19 @@ def fit_fall(time_s: Array, path: Array, R: Array) -> Fall:
     return Fall(solution[7:], noise**2 * inverse[7:, 7:], float(solution[6]), float(gravity_sd))
 
 
+def gravity_deviation(fall: Fall, time_s: Array) -> float:
+    """Return the sd of a fall's gravity over times (n,) [m/s2] with that of how the centre of mass wanders in the body.
+
+    As the body bends, whose masses are not quite the person's, by as much as it lies beside its place: a parabola of
+    duration T sags by g T^2 / 8.
+    """
+    return float(np.hypot(fall.gravity_sd_m_s2, 8 * _OFFSET_SD_M / np.ptp(time_s) ** 2))
+
+
 def find_wrong_fall(time_s: Array, path: Array, R: Array, variance: Array) -> WrongFall | None:
     """Find what a flight's gravity tells of wrong lengths or a wrong frame rate; None where it is 9.81 m/s2.
 
-    path (n, 3) [m] of the centre of mass, R (n, 3, 3) world from root, variance (n,) of the heights. Beside the fit's
-    error counts that the centre of mass wanders in the body: a parabola sags by g T^2 / 8.
+    path (n, 3) [m] of the centre of mass, R (n, 3, 3) world from root, variance (n,) of the heights.
     """
     rows = flight_rows(time_s, path[:, 2], variance)
     if len(rows):  # parabolas about the frames beside a stance hold some of it
@@ -81,7 +89,7 @@ def find_wrong_fall(time_s: Array, path: Array, R: Array, variance: Array) -> Wr
     if len(rows) < FEWEST_OF_SPAN:
         return None
     fall = fit_fall(time_s[rows], path[rows], R[rows])
-    sd_m_s2 = float(np.hypot(fall.gravity_sd_m_s2, 8 * _OFFSET_SD_M / np.ptp(time_s[rows]) ** 2))
+    sd_m_s2 = gravity_deviation(fall, time_s[rows])
     off = fall.gravity_m_s2 / GRAVITY_M_S2 - 1
     if not max(ALARM_SDS * sd_m_s2 / GRAVITY_M_S2, _LEAST_WRONG) < abs(off) < _MOST_WRONG:
         return None

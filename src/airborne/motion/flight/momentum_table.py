@@ -12,7 +12,14 @@ from airborne.body import BodyModel
 from airborne.constants import GRAVITY_M_S2
 from airborne.errors import BodyError
 from airborne.motion.angles import root_angles
-from airborne.motion.flight.fall import UNKNOWN_SD_M, find_wrong_fall, fit_fall, flight_rows, may_fall
+from airborne.motion.flight.fall import (
+    UNKNOWN_SD_M,
+    find_wrong_fall,
+    fit_fall,
+    flight_rows,
+    gravity_deviation,
+    may_fall,
+)
 from airborne.motion.flight.momentum import WINDOW, angular_momenta, centre_of_mass, limit_rotation_variance
 from airborne.motion.joints import require_body
 from airborne.motion.motion import Motion
@@ -43,7 +50,7 @@ class FlightSummary:
     angular_momentum_sd_kg_m2_s: Triple  # stated standard deviation of a frame, median; errors of masses last all run
     angular_momentum_spread_kg_m2_s: Triple  # standard deviation over the frames
     fitted_gravity_m_s2: float  # downward acceleration of the best-fitting parabola of the centre of mass
-    fitted_gravity_sd_m_s2: float  # by the distances from it, each of which depends on the one before
+    fitted_gravity_sd_m_s2: float  # by the distances from it, and by how the centre of mass wanders in the body
     ballistic_rms_mm: float  # of the centre of mass from the best parabola of 9.81 m/s2
 
     def to_dict(self) -> dict:
@@ -220,7 +227,7 @@ def _fit_parabola(time_s: Array, com: Array, R: Array) -> tuple[float, float, fl
     without_gravity = com + [0, 0, 0.5 * GRAVITY_M_S2] * t[:, None] ** 2
     line = np.vander(t, 2)
     residual = without_gravity - line @ np.linalg.lstsq(line, without_gravity, rcond=None)[0]
-    return fall.gravity_m_s2, fall.gravity_sd_m_s2, float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
+    return fall.gravity_m_s2, gravity_deviation(fall, time_s), float(np.sqrt(np.mean(np.sum(residual**2, axis=-1))))
 
 
 def _known_variance(sd: Array) -> Array:

@@ -8,13 +8,14 @@ of motion, a speed or a comparison without offsets has the rest alone in it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
-from airborne.motion.joints import landmark_jacobian, landmark_owners, landmark_variances, turning_place_variance
+from airborne.motion.joints import landmark_jacobian, landmark_owners, landmarks
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.run_fit import SmoothErrors
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
@@ -54,12 +55,13 @@ def constant_offsets(
 def frame_deviations(motion: Motion, model: BodyModel, offsets: Sequence[ConstantOffsets]) -> Array:
     """Return the sds of landmarks' errors that change from frame to frame: (n, landmarks) [m].
 
-    `offsets` are those of groups of frames; between two groups they are not the same, which counts as a change.
+    `offsets` are those of groups of frames; between two groups they are not the same, which counts as a change. That a
+    joint lies beside its place counts as a change, too: it turns with the other of its segments.
     """
     n_known = np.array([each.n_known for each in offsets], float)
     shares = n_known / np.maximum(n_known.sum(axis=0), 1)
     mean_m = np.einsum("gl,glak->lak", shares, [each.mean_m for each in offsets])
-    variance = landmark_variances(motion, model, motion.covariance) + turning_place_variance(model)
+    variance = landmarks(replace(motion, lasting=None), model)[1] ** 2
     for each in offsets:
         constant = each.variance_m2 - _mean_square(each.mean_m - mean_m)
         variance[each.rows] -= np.where(each.variance_m2 == 0, 0.0, constant)
