@@ -12,6 +12,7 @@ from airborne.geometry.rotations import (
     geodesic,
     is_near_singular,
     matrix_from_angles,
+    shortest_rotations,
     super_fibonacci,
     unwrap,
     wrap,
@@ -159,3 +160,18 @@ def test_a_spiral_of_3000_orientations_leaves_none_far_from_all():
     nearest = [geodesic(spiral, R).min() for R in Rotation.random(200, random_state=1).as_matrix()]
     assert np.mean(nearest) < np.radians(9)
     assert np.max(nearest) < np.radians(16)
+
+
+def test_shortest_rotations_turn_one_direction_to_another_about_what_is_square_to_both():
+    rng = np.random.default_rng(4)
+    before, after = rng.normal(size=(2, 50, 3))
+    after[0], after[1] = 3 * before[0], 0
+    after[2] = -before[2]
+    R = shortest_rotations(before, after)
+    turned, units = np.einsum("nij,nj->ni", R, before), after / np.maximum(np.linalg.norm(after, axis=1), 1e-9)[:, None]
+    expected = units * np.linalg.norm(before, axis=1)[:, None]
+    np.testing.assert_allclose(turned[3:], expected[3:], atol=ROUNDTRIP)
+    np.testing.assert_allclose(R[[0, 1, 2]], np.tile(np.eye(3), (3, 1, 1)), atol=ROUNDTRIP)
+    np.testing.assert_allclose(R @ R.swapaxes(1, 2), np.tile(np.eye(3), (50, 1, 1)), atol=ROUNDTRIP)
+    oracle = np.array([Rotation.align_vectors(a, b)[0].as_matrix() for a, b in zip(after[3:], before[3:], strict=True)])
+    np.testing.assert_allclose(R[3:], oracle, atol=1e-9)

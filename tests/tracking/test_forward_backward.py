@@ -8,9 +8,11 @@ import pytest
 
 from airborne.body.chain import delta_between
 from airborne.tracking import both_directions
+from airborne.tracking.backward import turn_estimate, turn_time
 from airborne.tracking.both_directions import track_forward_backward
 from airborne.tracking.estimate import Doubt, Estimate, Status, lost_estimate
 from airborne.tracking.methods import Settings, tracker_of
+from airborne.tracking.tracker import step
 from airborne.video import Frames
 from tests.support.people import HUMAN
 from tests.support.scenes import CROSS, Scene, errors
@@ -30,7 +32,7 @@ class LosesAnArm:
     def init(self):
         return 1  # the direction
 
-    def turn(self, state):
+    def turn(self, state, forward):
         return -state
 
     def learn(self, state, frames, estimate):
@@ -163,3 +165,18 @@ def test_a_run_goes_on_from_any_rows_to_the_same_result(scene):
         again, written = track(scene, {each.index: each for each in whole[kept]})
         assert bits(again) == bits(whole)
         assert len(written) == len(whole) - len(whole[kept])
+
+
+def test_what_one_direction_is_sure_of_the_other_takes_where_it_expects_it_and_looks_for_elsewhere(scene):
+    tracker = tracker_of(Settings(), CROSS, scene.start())
+    state, forward = tracker.init(), {}
+    for i in range(0, 12, 2):
+        state, forward[i] = step(tracker, state, scene.frames(i))
+    sure = {-i: turn_estimate(each) for i, each in forward.items()}
+    last = turn_time(scene.frames(10))
+    assert tracker.search(tracker.turn(state, sure), last) is sure[-10]
+    aside = sure[-10].pose.move(np.array([0.0, 0.0, 0.1]), np.zeros(3))
+    for known in (replace(sure[-10], status=Status.UNCERTAIN), replace(sure[-10], pose=aside)):
+        found = tracker.search(tracker.turn(state, sure | {-10: known}), last)
+        assert errors(scene, turn_estimate(found))[0] < 3
+        assert found.status is Status.TRACKED and found.pose is not known.pose

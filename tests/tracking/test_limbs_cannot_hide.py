@@ -8,6 +8,7 @@ from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator
 from airborne.tracking.model_based.image_views import image_views
 from airborne.tracking.model_based.learned_regions import LearnedRegions
+from airborne.tracking.model_based.mask_faults import find_mask_faults
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
 from airborne.tracking.model_based.uncovered import find_uncovered
 from tests.support.people import HUMAN
@@ -54,7 +55,7 @@ def test_joints_of_a_limb_beside_which_something_stands_uncovered_are_worth_one_
     for name, pose in (("true", frame.truth), ("wrong", fold(frame.truth, "thigh_right", FOLDS["thigh_right"]))):
         learned = LearnedRegions(Posteriors(*frame.views(pose)), frame.appearance)
         fit = fitter.fit_images([pose], learned, None)
-        faults = fitter._find_faults(fit, learned)
+        faults = find_mask_faults(fitter.render_model, fit, learned)
         agreement = fitter._assess(faults, faults.limbs.suspect, learned).agreement  # nothing is mended
         assert agreement.n_views_of is not None
         most[name] = [int(agreement.n_views_of[limb].max()) for limb in limbs_of(HUMAN)]
@@ -69,7 +70,7 @@ def test_fit_in_which_no_limb_moves_is_looked_through_once(frame, monkeypatch):
         looked_through.append(args)
         return find_uncovered(*args)
 
-    monkeypatch.setattr("airborne.tracking.model_based.fitter.find_uncovered", find)
+    monkeypatch.setattr("airborne.tracking.model_based.mask_faults.find_uncovered", find)
     fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
     learned = LearnedRegions(Posteriors(*frame.views(frame.truth)), frame.appearance)
     fit = fitter.fit_images([frame.truth], learned, None)

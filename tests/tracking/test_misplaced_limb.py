@@ -136,6 +136,19 @@ def test_limbs_that_are_not_where_they_were_expected_are_moved_and_stay(frame, n
         assert frame.off_mm(judged.fit.pose, limb_with(name)) < 60
 
 
+def test_limb_is_searched_for_once_where_both_directions_have_it_in_one_place(frame):
+    expected = fold(frame.truth, "upper_arm_left", FOLDS["upper_arm_left"])
+    prior, limb = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1)), limb_with("upper_arm_left")
+    learned = LearnedRegions(Posteriors(*frame.views(expected)), frame.appearance)
+    fitter = Fitter.of(frame.render_model, "refined", fixed_shape=False)
+    fit = fitter.fit_images([expected], learned, prior)
+    again = fitter.judge(fit, [expected], learned, prior, searched=fit.pose)
+    assert again.fit is fit and set(limb) <= set(again.agreement.misplaced)
+    for searched in (None, frame.truth):  # nowhere, or where the limb is elsewhere
+        judged = fitter.judge(fit, [expected], learned, prior, searched=searched)
+        assert frame.off_mm(judged.fit.pose, limb) < 60
+
+
 def test_limb_that_was_expected_stays_where_one_colour_shows_no_better_place(frame):
     expected = frame.truth
     prior = PosePrior(expected, np.full(HUMAN.n_dofs, 0.1))

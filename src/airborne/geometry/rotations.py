@@ -78,6 +78,18 @@ def angles_from_world_rotation(angles: Array) -> Array:
     return np.stack([somersault_row, np.stack([zero, c, s], axis=-1), twist_row], axis=-2)
 
 
+def shortest_rotations(before: Array, after: Array) -> Array:
+    """Return the shortest rotations (n, 3, 3) that turn vectors (n, 3) to the directions of others (n, 3).
+
+    Vectors of no length, and opposite ones, whose shortest rotation is not one alone, are not turned.
+    """
+    a, b = (each / np.maximum(np.linalg.norm(each, axis=-1, keepdims=True), 1e-300) for each in (before, after))
+    across, cosine = np.cross(a, b), np.sum(a * b, axis=-1)
+    x = np.cross(across[:, None], np.eye(3)).swapaxes(-1, -2)  # v -> across x v
+    is_opposite = cosine <= -1 + 1e-12
+    return np.eye(3) + np.where(is_opposite[:, None, None], 0, x + x @ x / np.maximum(1 + cosine, 1e-12)[:, None, None])
+
+
 def geodesic(A: Array, B: Array) -> Array:
     """Return the angle of the rotation between A and B, rotation matrices (..., 3, 3): (...) [rad], 0..pi."""
     relative = np.swapaxes(A, -1, -2) @ B

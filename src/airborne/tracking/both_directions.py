@@ -25,8 +25,11 @@ _ELSEWHERE_SHARE = 0.35  # of the segments after the root, of a person two limbs
 class TurningTracker(Tracker[Any, Estimate], Protocol):
     """A tracker that can go back in time, and weigh poses by the images alone."""
 
-    def turn(self, state: Any) -> Any:
-        """Return the state from which the body is tracked back in time, from frames with times counted backward."""
+    def turn(self, state: Any, forward: Mapping[int, Estimate]) -> Any:
+        """Return the state from which the body is tracked back in time, from frames with times counted backward.
+
+        `forward`: what was found in them forward in time, by frame, numbers and times counted backward too.
+        """
         ...
 
     def weigh(self, state: Any, frames: Frames, poses: Sequence[Pose]) -> Array:
@@ -191,7 +194,7 @@ def _track_both_ways(
     if turn is None or (only_if_doubtful and not is_doubtful):
         return forward, None if known.keys() & forward.keys() else state
     passes: list[Passes] = []
-    state = tracker.turn(state)
+    state = tracker.turn(state, {-index: turn_estimate(estimate) for index, estimate in forward.items()})
     for observed in reader.backward(stretch.start, turn):
         turned = turn_time(observed)
         back = tracker.search(state, turned)

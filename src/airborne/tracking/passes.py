@@ -20,12 +20,11 @@ from airborne.body import BodyModel, Pose
 from airborne.body.chain import delta_between, joint_angles_of, move_pose
 from airborne.tracking.estimate import Doubt, Estimate, Status, with_doubt
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
+from airborne.tracking.model_based.misplaced_limbs import APART_M
 from airborne.tracking.unobserved import with_unobserved, without_unobserved
 from airborne.types import Array
 
 _DISAGREE_P = 1e-3  # two passes that agree differ by more than this test allows in one frame of a thousand
-_APART_M = 0.05  # of a joint: poses further apart are two places, not one; on synthetic people such frames hold 40 of
-# 42 in which a joint is over 80 mm off, and 22 of 68 others
 _STATUS_ORDER = (Status.TRACKED, Status.UNCERTAIN, Status.LOST)
 
 
@@ -34,8 +33,8 @@ class PassDifference:
     """How two estimates of one time differ."""
 
     delta: Array  # (6 + 3 joints,) from the forward to the backward one; empty where either has no pose
-    apart: tuple[int, ...]  # the parts, see `parts_of`, that disagree: beyond their covariances, or by _APART_M
-    is_far: NDArray[np.bool_]  # which segments have a landmark further apart than _APART_M; empty as `delta`
+    apart: tuple[int, ...]  # the parts, see `parts_of`, that disagree: beyond their covariances, or by APART_M
+    is_far: NDArray[np.bool_]  # which segments have a landmark further apart than APART_M; empty as `delta`
     candidates: tuple[Pose, ...]  # the forward pose, and it with each of those parts as the backward pass has it
 
 
@@ -64,7 +63,7 @@ def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> Pass
     covariance = _covariance(forward, len(delta)) + _covariance(backward, len(delta))
     parts, here, there = parts_of(model), model.with_pose(forward.pose), model.with_pose(backward.pose)
     off_m, is_far = np.linalg.norm(here.landmarks - there.landmarks, axis=-1), np.zeros(len(model.segments), np.bool_)
-    is_far[[model.index_of(model.landmarks[k].segment) for k in np.flatnonzero(off_m > _APART_M)]] = True
+    is_far[[model.index_of(model.landmarks[k].segment) for k in np.flatnonzero(off_m > APART_M)]] = True
     part_of = np.unique(limb_of_segment(model), return_inverse=True)[1]
     apart = tuple(
         k

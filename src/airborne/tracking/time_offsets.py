@@ -7,7 +7,7 @@ person's limbs are assumed to move with the root.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -70,9 +70,9 @@ class CompensatedTracker:
         past = state.past if estimate.pose is None else _extend(state.past, frames, estimate.pose)
         return CompensatedState(self._tracker.learn(state.inner, compensate_offsets(frames, past), estimate), past)
 
-    def turn(self, state: CompensatedState) -> CompensatedState:
-        """Return the state from which the body is tracked back in time."""
-        return CompensatedState(self._tracker.turn(state.inner), turn_past(state.past))
+    def turn(self, state: CompensatedState, forward: Mapping[int, Estimate]) -> CompensatedState:
+        """Return the state from which the body is tracked back in time, after the estimates `forward` by frame."""
+        return CompensatedState(self._tracker.turn(state.inner, forward), turn_past(state.past))
 
     def weigh(self, state: CompensatedState, frames: Frames, poses: Sequence[Pose]) -> Array:
         """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""

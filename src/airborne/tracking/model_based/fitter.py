@@ -32,10 +32,10 @@ from airborne.tracking.model_based.gauss_newton import (
 from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import swap_limbs
+from airborne.tracking.model_based.mask_faults import MaskFaults, find_mask_faults
 from airborne.tracking.model_based.misplaced_limbs import (
     SAME_M,
-    LimbFaults,
-    find_misplaced_limbs,
+    is_same_place,
     limb_distance,
     search_limb,
     with_limb,
@@ -43,7 +43,6 @@ from airborne.tracking.model_based.misplaced_limbs import (
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
-from airborne.tracking.model_based.uncovered import find_uncovered
 from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
@@ -53,8 +52,6 @@ LOST_NATS = 10.0
 # of evidence that a mask gains at least where a new fit of the whole body is better: of 153 such fits, of three
 # synthetic people and two recorded ones, the 29 that were taken had gained 5.3 or more
 _RISEN_NATS = 4.0
-_BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
-_FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
 _TRUNK_AT = 4  # images at this reduction show the limbs of a body with joints; more reduced ones, its trunk alone
 
 
@@ -64,16 +61,6 @@ class JudgedFit:
 
     fit: Fit
     agreement: MaskAgreement
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _MaskFaults:
-    """A fit, and where its mask and the images do not go together."""
-
-    fit: Fit
-    limbs: LimbFaults  # that cover pixels unlike the body
-    beside: Sequence[NDArray[np.int64]]  # limbs beside which more than a rim stands uncovered, in two views
-    n_views_uncovered: int  # in which something like a limb stands out that the body does not cover
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,22 +121,31 @@ class Fitter:
         noise = min(each.noise for each in equations)
         return np.array([each.objective(noise, 0.0) for each in equations])
 
-    def judge(self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None) -> JudgedFit:
-        """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it."""
+    def judge(
+        self,
+        fit: Fit,
+        guesses: Sequence[Pose],
+        learned: LearnedRegions,
+        prior: PosePrior | None,
+        *,
+        searched: Pose | None = None,
+    ) -> JudgedFit:
+        """Refit the limbs that the fit has misplaced, from the guesses and from a search; judge what comes of it.
+
+        Where the fit ends in a pose in which limbs were `searched` for already, they are not searched for again.
+        """
         if not self.moves_joints:
             return JudgedFit(fit, self.agreement(fit.pose, learned))
-        faults = self._refit_limbs(fit, guesses, learned, prior)
+        faults = self._refit_limbs(fit, guesses, learned, prior, searched)
         return self._assess(faults, faults.limbs.suspect, learned)
 
     def judge_pose(self, pose: Pose, learned: LearnedRegions) -> JudgedFit:
         """Judge a pose with joints that frames before and after confirm: only limbs that are surely misplaced are."""
         fit = linearise_fit(self.render_model, pose, self._views([pose], learned), dofs=self.stages[-1])
-        faults = self._find_faults(fit, learned)
+        faults = find_mask_faults(self.render_model, fit, learned)
         return self._assess(faults, faults.limbs.misplaced, learned)
 
-    def _assess(
-        self, faults: _MaskFaults, misplaced: Sequence[NDArray[np.int64]], learned: LearnedRegions
-    ) -> JudgedFit:
+    def _assess(self, faults: MaskFaults, misplaced: Sequence[NDArray[np.int64]], learned: LearnedRegions) -> JudgedFit:
         fit, segments = faults.fit, tuple(int(segment) for limb in misplaced for segment in limb)
         n_views_of = count_views(self.render_model, fit.pose, fit.views, fit.equations.noise_of_views)
         for limb in faults.beside:  # it may be there: no better than one view
@@ -171,36 +167,44 @@ class Fitter:
         return learned.image_views(self.render_model, bodies, are_narrow=not self.moves_joints)
 
     def _refit_limbs(
-        self, fit: Fit, guesses: Sequence[Pose], learned: LearnedRegions, prior: PosePrior | None
-    ) -> _MaskFaults:
+        self,
+        fit: Fit,
+        guesses: Sequence[Pose],
+        learned: LearnedRegions,
+        prior: PosePrior | None,
+        searched: Pose | None,
+    ) -> MaskFaults:
         """Search for the limbs that cover what is unlike the body, or beside which, or anywhere, what is stands out.
 
         None is searched for again before another has moved. Before the first, the whole body is fitted again.
         """
-        tried = set[int]()
+        limbs, tried = limbs_of(self.model), set[int]()
+        if searched is not None:
+            tried = {int(limb[0]) for limb in limbs if is_same_place(self.model, fit.pose, searched, limb)}
+        is_tried = searched is not None and is_same_place(self.model, fit.pose, searched)
 
         def search(
-            limb: NDArray[np.int64], faults: _MaskFaults, prior: PosePrior | None
-        ) -> tuple[_MaskFaults, PosePrior | None]:
+            limb: NDArray[np.int64], faults: MaskFaults, prior: PosePrior | None
+        ) -> tuple[MaskFaults, PosePrior | None]:
             if int(limb[0]) in tried:
                 return faults, prior
             moved, prior = self._refit_limb(faults.fit, limb, guesses, learned, prior=prior)
             if moved is not faults.fit:
                 tried.clear()
-                faults = self._find_faults(moved, learned)
+                faults = find_mask_faults(self.render_model, moved, learned)
             tried.add(int(limb[0]))
             return faults, prior
 
-        faults = self._find_faults(fit, learned)
+        faults = find_mask_faults(self.render_model, fit, learned)
         if faults.limbs.suspect or faults.beside or turned_pelvis.is_improbable(self.model, fit.pose):
-            refitted, prior = self._refit_body(fit, learned, prior)
-            faults = faults if refitted is fit else self._find_faults(refitted, learned)
+            refitted, prior = (fit, prior) if is_tried else self._refit_body(fit, learned, prior)
+            faults = faults if refitted is fit else find_mask_faults(self.render_model, refitted, learned)
             for limb in faults.limbs.suspect:
                 faults, prior = search(limb, faults, prior)
             for limb in faults.beside:
                 faults, prior = search(limb, faults, prior)
-        for limb in limbs_of(self.model):
-            if faults.n_views_uncovered < _FEWEST_VIEWS:
+        for limb in limbs:
+            if not faults.asks_for_limb:
                 break
             faults, prior = search(limb, faults, prior)
         return faults
@@ -284,14 +288,6 @@ class Fitter:
         stays = min(self.place_cost(fit, learned, misfit, prior), costs[0])
         best = int(np.argmin(costs))
         return ((fit, *others)[best], widened) if costs[best] < stays else (fit, prior)
-
-    def _find_faults(self, fit: Fit, learned: LearnedRegions) -> _MaskFaults:
-        model = self.render_model
-        limbs = find_misplaced_limbs(model, fit.pose, *learned.views)
-        pixels, beside_m2 = find_uncovered(model, model.with_pose(fit.pose), *learned.views)
-        of_limb = ((limb, beside_m2[:, limb].sum(axis=1)) for limb in limbs_of(self.model))
-        beside = [limb for limb, areas_m2 in of_limb if np.sum(areas_m2 > _BESIDE_M2) >= _FEWEST_VIEWS]
-        return _MaskFaults(fit, limbs, beside, sum(bool(each.any()) for each in pixels))
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]

@@ -34,10 +34,11 @@ def fit_next(
     *,
     reference: Reference,
     prior: PosePrior | None,
+    searched: Pose | None = None,
 ) -> JudgedFit | None:
     """Fit from the first predicted pose that agrees with the images, or else from the one of most evidence.
 
-    None where no view shows any of them.
+    None where no view shows any of them. `searched`: a pose of these frames in which limbs were searched for already.
     """
     learned = regions_near(fitter, predicted, frames, appearance)
     if not learned.masks.regions:
@@ -54,4 +55,4 @@ def fit_next(
     swaps = [pose for pose in fitter.swap_limbs(fit.pose) if is_nearer(fitter.model, pose, fit.pose, expected)]
     if swaps:
         fit = fitter.fit_images([fit.pose, *swaps], learned, prior)
-    return fitter.judge(fit, predicted, learned, prior)
+    return fitter.judge(fit, predicted, learned, prior, searched=searched)

@@ -29,6 +29,9 @@ _ROUNDS = ((512, 24), (512, 16), (512, 3))  # proposals, survivors; the sds are 
 _REACH_RAD = 0.7  # sd of the first proposals, for each joint and axis
 _N_WIDE, _LARGE_RAD = 1024, np.radians(50)  # starts all over the ranges, of those axes whose half is larger
 DISTINCT_M = 0.1  # two places of a limb, of which some joint is this far apart: about the width of an arm
+# of a joint: poses further apart are two places, not one; on synthetic people such frames hold 40 of 42 in which a
+# joint is over 80 mm off, and 22 of 68 others
+APART_M = 0.05
 SAME_M = 0.02  # fits from two places of a limb that are no further apart end in the same
 # of all places elsewhere, before a search ends at its starts; chosen on synthetic people in two and three views: of 657
 # searches 271 end, of which 3 moved a limb, by 33 to 59 mm; with 0 nats 372, of which 8, by up to 0.6 m
@@ -113,6 +116,12 @@ def limb_distance(model: BodyModel, pose: Pose, other: Pose, limb: NDArray[np.in
         return 0.0
     here, there = limb_points(model, [model.with_pose(each) for each in (pose, other)], limb)
     return float(np.linalg.norm(here - there, axis=1).max())
+
+
+def is_same_place(model: BodyModel, pose: Pose, other: Pose, limb: NDArray[np.int64] | None = None) -> bool:
+    """Whether two poses have a limb, or all of the body, in one place: no joint or landmark is `APART_M` apart."""
+    limb = np.arange(len(model.segments)) if limb is None else limb
+    return limb_distance(model, pose, other, limb) < APART_M
 
 
 def limb_points(model: BodyModel, bodies: Sequence[PosedBody], limb: NDArray[np.int64]) -> list[Array]:

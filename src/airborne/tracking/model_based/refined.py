@@ -17,7 +17,7 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import BodyModel, Pose
 from airborne.rendering import Lights
 from airborne.tracking import predictors
-from airborne.tracking.estimate import Doubt, Estimate, Status, lost_estimate
+from airborne.tracking.estimate import Doubt, Estimate, Status, has_unknown_limb, lost_estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose.evidence_fit import join_evidence
 from airborne.tracking.image_regions import crop_regions, reduce_frames, share_in_view
@@ -30,6 +30,7 @@ from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regi
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.lens_blur import learn_blurs
+from airborne.tracking.model_based.misplaced_limbs import is_same_place
 from airborne.tracking.model_based.recovery import is_same, recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, doubts_of, is_lost
@@ -63,6 +64,7 @@ class RefinedState:
     reference: Reference = field(default_factory=Reference)
     covariance: Array | None = None  # of the last estimated pose
     n_learned: int = 0  # from how many frames was learned
+    other_direction: Mapping[int, Estimate] = field(default_factory=dict)  # by frame, of the other direction of time
 
 
 class RefinedTracker:
@@ -97,12 +99,15 @@ class RefinedTracker:
     def search(self, state: RefinedState, frames: Frames) -> Estimate:
         """Find the body in the frames, without learning from them."""
         frames = self.reduce_frames(frames)
+        known = state.other_direction.get(frames.index)
         if frames.index in self._keys:
             found = self._search_at_key(state, frames, self._keys[frames.index])
+        elif known is not None and self._is_expected(state, known):
+            return known
         elif not state.past:
             found = self._search_first(frames)
         else:
-            found = self._search_later(state, frames)
+            found = self._search_later(state, frames, None if known is None else known.pose)
         if found is not None and state.past and not self._fitter.moves_joints:
             found = replace(found, fit=fit_exposed(self.render_model, found.fit, self._motion(state.past, frames)))
         return self._estimate(frames, found, state.reference)
@@ -137,16 +142,21 @@ class RefinedTracker:
         if not state.past:  # nothing was known of colours before
             shares = self._mask_shares(estimate.pose, regions, appearance)
         reference = state.reference.update(*shares) if shares else state.reference
-        return RefinedState(past, appearance, reference, estimate.covariance, state.n_learned + 1)
+        n_learned = state.n_learned + 1
+        return RefinedState(past, appearance, reference, estimate.covariance, n_learned, state.other_direction)
 
     def _mask_shares(self, pose: Pose, regions: Sequence[Region], known: Appearance) -> tuple[float, float] | None:
         """Return precision and recall of a pose's mask; None where no region's colours have been learned."""
         learned = LearnedRegions.of(regions, known)
         return self._fitter.agreement(pose, learned).shares if learned.masks.regions else None
 
-    def turn(self, state: RefinedState) -> RefinedState:
-        """Return the state from which the body is tracked back in time: the past is as it would be met then."""
-        return replace(state, past=predictors.turn_past(state.past))
+    def turn(self, state: RefinedState, forward: Mapping[int, Estimate]) -> RefinedState:
+        """Return the state from which the body is tracked back in time: the past is as it would be met then.
+
+        What was found forward in time is taken where it is expected on the way back and nothing is in doubt. Where both
+        directions find the same pose, no limb is searched for again.
+        """
+        return replace(state, past=predictors.turn_past(state.past), other_direction=forward)
 
     def weigh(self, state: RefinedState, frames: Frames, poses: Sequence[Pose]) -> Array:
         """Return minus the log-likelihood of the images in each of several poses: (n,) [nat]."""
@@ -182,7 +192,14 @@ class RefinedTracker:
     def _search_first(self, frames: Frames) -> JudgedFit | None:
         return fit_first(self._fitter, self._start, frames, self._prior(self._start, FIRST_POSE_SD))
 
-    def _search_later(self, state: RefinedState, frames: Frames) -> JudgedFit | None:
+    def _is_expected(self, state: RefinedState, known: Estimate) -> bool:
+        """Whether an estimate leaves nothing in doubt, and the body was to be expected there."""
+        if known.pose is None or known.status is not Status.TRACKED or has_unknown_limb(known, self._fitter.model):
+            return False
+        expected = self._predict[0](state.past, known.time_s)
+        return is_same_place(self._fitter.model, expected, known.pose)
+
+    def _search_later(self, state: RefinedState, frames: Frames, searched: Pose | None) -> JudgedFit | None:
         last_s, last = state.past[-1]
         gap_s = float(frames.time_s - last_s)
         predicted = [predict(state.past, frames.time_s) for predict in self._predict]
@@ -190,7 +207,7 @@ class RefinedTracker:
             predicted = [shrink_unobserved(last, pose, state.covariance) for pose in predicted]
         prior = self._prior_after(predicted[-1], gap_s)
         args = self._fitter, predicted, frames, state.appearance
-        found = fit_next(*args, reference=state.reference, prior=prior)
+        found = fit_next(*args, reference=state.reference, prior=prior, searched=searched)
         if found is not None and not found.agreement.is_suspect(state.reference):
             return found
         suspect = None

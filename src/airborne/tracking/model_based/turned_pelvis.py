@@ -15,11 +15,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import joint_angles_of
 from airborne.body.sides import are_crossed
-from airborne.geometry.rotations import matrix_from_angles
+from airborne.geometry.rotations import matrix_from_angles, shortest_rotations
 from airborne.rendering import EvidenceMaps, mask_evidence
 from airborne.tracking.model_based.degrees_of_freedom import joints_of, limb_of_segment, limbs_of
 from airborne.tracking.model_based.left_right_swap import counterparts
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.types import Array
 
 _TURNS_RAD = np.radians([-60, -40, -20, 20, 40, 60])  # about the long axis; further, a leg would cross the other
 # with which the legs are exchanged: every 30 degrees, half of which a fit makes up for
@@ -30,24 +31,24 @@ _FEWEST_AT_LIMIT = 2  # joints of the trunk: a single one often is, in tucks of 
 
 def turn_pelvis(model: BodyModel, pose: Pose) -> list[Pose]:
     """Return poses with the root turned about its long axis; limbs on it aim where they did, nothing else moves."""
-    return [_turn(model, pose, angle, np.arange(len(model.segments))) for angle in _TURNS_RAD]
+    return _poses(pose, *_turn(model, pose, _TURNS_RAD, np.arange(len(model.segments))))
 
 
 def find_turned_pelvis(render_model: RenderModel, pose: Pose, maps: EvidenceMaps) -> list[Pose]:
     """Return the pose with its pelvis turned, if that has more evidence on reduced images or the pose is improbable."""
-    poses = [pose, *turn_pelvis(render_model.model, pose)]
-    bodies = [render_model.with_pose(each) for each in poses]
-    R, t = np.stack([body.R for body in bodies]), np.stack([body.t for body in bodies])
-    evidence = mask_evidence(render_model.geometry, maps, R, t).sum(axis=1)
-    if is_improbable(render_model.model, pose):
+    model, root = render_model.model, pose.world_from_root
+    R, angles = _turn(model, pose, np.append(0.0, _TURNS_RAD), np.arange(len(render_model.model.segments)))
+    posed = model.pose_segments(R, root.translation, angles)
+    evidence = mask_evidence(render_model.geometry, maps, *posed).sum(axis=1)
+    if is_improbable(model, pose):
         evidence[0] = -np.inf
     best = int(np.argmax(evidence))
-    return [poses[best]] if best else []
+    return _poses(pose, R[best, None], angles[best, None]) if best else []
 
 
 def turn_pelvis_back(model: BodyModel, pose: Pose) -> list[Pose]:
     """Return poses with the root turned further; limbs on it aim where their counterparts did, turned like these."""
-    return [_turn(model, pose, angle, counterparts(model)) for angle in _TURNS_BACK_RAD]
+    return _poses(pose, *_turn(model, pose, _TURNS_BACK_RAD, counterparts(model)))
 
 
 def turned_columns(model: BodyModel) -> NDArray[np.int64]:
@@ -73,16 +74,26 @@ def is_twisted(model: BodyModel, pose: Pose) -> bool:
     return int(np.sum((slack < _AT_LIMIT_RAD) & (limb_of_segment(model)[1:] < 0))) >= _FEWEST_AT_LIMIT
 
 
-def _turn(model: BodyModel, pose: Pose, angle: float, source: NDArray[np.int64]) -> Pose:
-    """Turn the root; its limbs take the rotations and aims of those of the segments `source` (segments,)."""
-    body, on_root = model.with_pose(pose), limbs_on_root(model)
-    R, t = body.R.copy(), body.t.copy()
+def _turn(model: BodyModel, pose: Pose, turns_rad: Array, source: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Turn the root, whose limbs take the rotations and aims of those of the segments `source` (segments,).
+
+    Return the root's rotations (n, 3, 3) and the joint angles (n, joints, 3), for each of the turns (n,).
+    """
+    body, on_root, joints_m = model.with_pose(pose), limbs_on_root(model), model.joints_m
+    R, t = np.repeat(body.R[None], len(turns_rad), axis=0), body.t.copy()
     for limb in on_root:
-        R[limb], t[limb] = body.R[source[limb]], body.t[source[limb]]
-    R[0] = R[0] @ Rotation.from_rotvec([0, 0, angle]).as_matrix()
+        R[:, limb], t[limb] = body.R[source[limb]], body.t[source[limb]]
+    R[:, 0] = R[:, 0] @ matrix_from_angles(turns_rad[:, None] * [0.0, 0.0, 1.0])
     for first, second, *_ in on_root:
-        joint = body.t[0] + R[0] @ np.asarray(model.segments[first].joint_m)
-        before, after = R[first] @ np.asarray(model.segments[second].joint_m), t[second] - joint
-        R[first] = Rotation.align_vectors(after, before)[0].as_matrix() @ R[first]
-    root = RigidTransform.from_components(pose.world_from_root.translation, Rotation.from_matrix(R[0]))
-    return replace(pose, world_from_root=root, joint_angles=joint_angles_of(model, R, near=pose.joint_angles))
+        joints = body.t[0] + R[:, 0] @ joints_m[first]
+        R[:, first] = shortest_rotations(R[:, first] @ joints_m[second], t[second] - joints) @ R[:, first]
+    return R[:, 0], joint_angles_of(model, R, near=pose.joint_angles)
+
+
+def _poses(pose: Pose, root_R: Array, joint_angles: Array) -> list[Pose]:
+    """Return a pose with the root's rotations (n, 3, 3) and joint angles (n, joints, 3)."""
+    place = pose.world_from_root.translation
+    return [
+        replace(pose, world_from_root=RigidTransform.from_components(place, Rotation.from_matrix(R)), joint_angles=each)
+        for R, each in zip(root_R, joint_angles, strict=True)
+    ]
