@@ -1,6 +1,6 @@
 """A body is tracked forward and backward without any key: what one direction loses, the other has."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 import numpy as np
@@ -180,3 +180,26 @@ def test_what_one_direction_is_sure_of_the_other_takes_where_it_expects_it_and_l
         found = tracker.search(tracker.turn(state, sure | {-10: known}), last)
         assert errors(scene, turn_estimate(found))[0] < 3
         assert found.status is Status.TRACKED and found.pose is not known.pose
+
+
+@dataclass(frozen=True)
+class Learns(LosesAnArm):
+    """A tracker in doubt in every frame, which keeps what it learns from."""
+
+    learned: list[int] = field(default_factory=list)
+
+    def search(self, state, frames):
+        return replace(super().search(state, frames), status=Status.UNCERTAIN)
+
+    def learn(self, state, frames, estimate):
+        self.learned.append(frames.index)
+        return state
+
+
+def test_from_joined_estimates_is_learned_only_what_a_later_stretch_may_need(monkeypatch):
+    monkeypatch.setattr(both_directions, "_MOST_BYTES", 0)
+    monkeypatch.setattr(both_directions, "_FEWEST_HELD", 4)
+    tracker = Learns()
+    assert [each.index for each in found_by(tracker, 8)] == list(range(8))
+    both_ways = [*range(1, 5), *range(-3, 0)], [*range(5, 8), *range(-6, -4)]  # back from the last frame, found forward
+    assert tracker.learned == [0, *both_ways[0], *range(1, 5), *both_ways[1]]

@@ -173,7 +173,7 @@ def _fit_limb(problem: LandmarkProblem, state: PoseState, top: int) -> PoseState
     """
     model = problem.model
     limb = _subtree(model, top)
-    is_own = np.isin(problem.segments, limb)
+    is_own = np.isin(problem.model.landmark_segments, limb)
     if not (problem.is_given & is_own).any():
         return state
     alone = replace(problem, targets=np.where(is_own[:, None], problem.targets, np.nan))
@@ -225,7 +225,7 @@ def _check(problem: LandmarkProblem, names: list[str], *, has_start: bool) -> No
 
 def _carriers(model: BodyModel, landmark: int) -> list[int]:
     """Return the segments in which a landmark is fixed: its own, and at the segment's origin the parent too."""
-    own = model.index_of(model.landmarks[landmark].segment)
+    own = int(model.landmark_segments[landmark])
     return [own, int(model.parents[own])] if model.landmarks[landmark].at_joint and own > 0 else [own]
 
 

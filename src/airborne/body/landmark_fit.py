@@ -36,16 +36,6 @@ class LandmarkProblem:
     neutral: Array | None = None  # (joints, 3) angles [rad]; None: straight, as far as the limits allow
 
     @cached_property
-    def segments(self) -> NDArray[np.int64]:
-        """The segment that carries each landmark: (landmarks,)."""
-        return np.array([self.model.index_of(landmark.segment) for landmark in self.model.landmarks])
-
-    @cached_property
-    def local(self) -> Array:
-        """The landmarks in their segments' frames: (landmarks, 3) [m]."""
-        return np.array([landmark.position_m for landmark in self.model.landmarks])
-
-    @cached_property
     def is_given(self) -> NDArray[np.bool_]:
         """Whether each landmark has a target: (landmarks,)."""
         return np.asarray(np.isfinite(self.targets).all(axis=1))
@@ -54,7 +44,12 @@ class LandmarkProblem:
     def given(self) -> tuple[NDArray[np.int64], Array, Array, Array]:
         """Of the landmarks with a target (n,): the segments, the places (n, 3) in them, the targets, and the scales."""
         rows = self.is_given
-        return self.segments[rows], self.local[rows], self.targets[rows], (self.root_weights / self.sd_m)[rows]
+        return (
+            self.model.landmark_segments[rows],
+            self.model.landmarks_m[rows],
+            self.targets[rows],
+            (self.root_weights / self.sd_m)[rows],
+        )
 
     @cached_property
     def prior(self) -> Array:
@@ -154,8 +149,9 @@ def landmark_positions(problem: LandmarkProblem, state: PoseState) -> Array:
     """Return the landmarks' positions: (..., landmarks, 3) world [m]."""
     shape = state.angles.shape[:-2]
     R, t = problem.model.pose_segments(state.R, state.t, state.angles.reshape(math.prod(shape), -1, 3))
-    points = np.einsum("hnij,nj->hni", R[:, problem.segments], problem.local) + t[:, problem.segments]
-    return points.reshape(*shape, *problem.local.shape)
+    own, places_m = problem.model.landmark_segments, problem.model.landmarks_m
+    points = np.einsum("hnij,nj->hni", R[:, own], places_m) + t[:, own]
+    return points.reshape(*shape, *places_m.shape)
 
 
 def landmark_distances(problem: LandmarkProblem, state: PoseState) -> Array:

@@ -7,6 +7,7 @@ on a rectangle, narrow across a hinge.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
 from airborne.geometry.swing_twist import rotation_of, swing_twist_from_matrix
+from airborne.kernels import kernel
 from airborne.types import Array
 
 _BALL_RAD = np.radians(20)  # a range of angles wider than this, to both sides of its middle, about x and y: a ball
@@ -78,10 +80,10 @@ class JointLimits:
 
     def nearest(self, coordinates: Array) -> Array:
         """Return the nearest coordinates (..., 3) within the limits; a ball's swing goes back on its own meridian."""
-        bounded = np.clip(coordinates, -self.half_rad, self.half_rad)
-        reach = np.hypot(coordinates[..., 0] / self.half_rad[..., 0], coordinates[..., 1] / self.half_rad[..., 1])
-        elliptic = coordinates[..., :2] / np.maximum(reach, 1.0)[..., None]
-        bounded[..., :2] = np.where(self.is_ball[..., None], elliptic, bounded[..., :2])
+        shape = np.broadcast_shapes(coordinates.shape, self.half_rad.shape)
+        bounded = np.array(np.broadcast_to(coordinates, shape), float)
+        half = np.ascontiguousarray(self.half_rad, float).reshape(-1, 3)
+        _bound(bounded.reshape(-1, 3), half, np.ascontiguousarray(self.is_ball).reshape(-1))
         return bounded
 
     def excess(self, R: Array) -> Array:
@@ -103,6 +105,20 @@ class JointLimits:
         bounded = self.nearest(coordinates)
         is_out = np.any(bounded != coordinates, axis=-1)
         return np.where(is_out[..., None, None], self.rotation(bounded), R)
+
+
+@kernel
+def _bound(coordinates, half, is_ball):
+    """Bound coordinates (n, 3), of the joints again and again: half (joints, 3), is_ball (joints,)."""
+    for n in range(len(coordinates)):
+        k, reach = n % len(half), 1.0
+        if is_ball[k]:
+            reach = max(math.hypot(coordinates[n, 0] / half[k, 0], coordinates[n, 1] / half[k, 1]), 1.0)
+        for axis in range(3):
+            if axis < 2 and is_ball[k]:
+                coordinates[n, axis] /= reach
+            else:
+                coordinates[n, axis] = min(max(coordinates[n, axis], -half[k, axis]), half[k, axis])
 
 
 FREE = JointLimits(np.eye(3), np.full(3, np.inf), np.asarray(False))  # a joint without limits

@@ -185,6 +185,16 @@ class BodyModel:
         """Where every segment's joint lies in its parent: (segments, 3) [m]."""
         return np.array([segment.joint_m for segment in self.segments], float)
 
+    @cached_property
+    def landmark_segments(self) -> NDArray[np.int64]:
+        """The index of each landmark's segment: (landmarks,)."""
+        return np.array([self.index_of(landmark.segment) for landmark in self.landmarks], np.int64)
+
+    @cached_property
+    def landmarks_m(self) -> Array:
+        """Where every landmark lies in its segment: (landmarks, 3) [m]."""
+        return np.array([landmark.position_m for landmark in self.landmarks], float).reshape(-1, 3)
+
     @property
     def n_joints(self) -> int:
         """The number of joints: every segment but the root has one."""
@@ -236,10 +246,8 @@ class BodyModel:
 
     def with_colours(self, colours: Array) -> BodyModel:
         """Return the body with the colours (parts, 3), sRGB 0..255, in the order of `parts`."""
-        queue = iter(np.asarray(colours, float))
-        segments = tuple(
-            replace(s, parts=tuple(replace(part, colour=next(queue)) for part in s.parts)) for s in self.segments
-        )
+        rows = iter(np.asarray(colours, float))
+        segments = tuple(replace(s, parts=tuple(replace(p, colour=next(rows)) for p in s.parts)) for s in self.segments)
         return replace(self, segments=segments)
 
     def with_pose(self, pose: Pose) -> PosedBody:
@@ -275,19 +283,13 @@ class PosedBody:
     @property
     def landmarks(self) -> Array:
         """The positions of the model's landmarks: (landmarks, 3) world [m]."""
-        owners = [self.model.index_of(landmark.segment) for landmark in self.model.landmarks]
-        local = np.array([landmark.position_m for landmark in self.model.landmarks])
-        return np.einsum("nij,nj->ni", self.R[owners], local) + self.t[owners]
+        owners = self.model.landmark_segments
+        return np.einsum("nij,nj->ni", self.R[owners], self.model.landmarks_m) + self.t[owners]
 
     def move(self, motion: Array) -> PosedBody:
         """Move the whole body: motion (6,) is a translation [m], a rotation about the root [rad], world axes."""
         R = Rotation.from_rotvec(motion[3:]).as_matrix()
         return PosedBody(self.model, R @ self.R, (self.t - self.t[0]) @ R.T + self.t[0] + motion[:3])
-
-    @property
-    def world_from_root(self) -> RigidTransform:
-        """The root's position and orientation."""
-        return RigidTransform.from_components(self.t[0], Rotation.from_matrix(self.R[0]))
 
 
 def _require_positive(values: Array, name: str) -> None:

@@ -101,7 +101,7 @@ class ShapeMotion:
 
     def landmark_jacobian(self, posed: PosedBody) -> Array:
         """Return how the landmarks move by shape and pose: (m, 3, k + 6 + 3 joints)."""
-        owners = np.array([self.model.index_of(mark.segment) for mark in self.model.landmarks])
+        owners = self.model.landmark_segments
         by_shape = self.joints(posed)[:, owners] + np.einsum("mij,kmj->kmi", posed.R[owners], self.landmark)
         by_pose = point_jacobian(posed, owners, posed.landmarks)
         return np.concatenate([np.moveaxis(by_shape, 0, -1), by_pose], axis=-1)

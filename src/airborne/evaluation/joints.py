@@ -224,7 +224,7 @@ def _match_markers(model: BodyModel, reference: JointPaths) -> tuple[dict[str, i
 
 def _rotations(motion: Motion, model: BodyModel, columns: list[int]) -> Array:
     """Return the world rotations of the landmarks' segments: (n, landmarks, 3, 3)."""
-    owners = [model.index_of(model.landmarks[k].segment) for k in columns]
+    owners = model.landmark_segments[columns]
     R = np.full((len(motion), len(owners), 3, 3), np.nan)
     for row in np.flatnonzero(motion.has_pose):
         R[row] = model.with_pose(motion.pose(row)).R[owners]

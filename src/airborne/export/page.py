@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from airborne.errors import format_digits
 from airborne.export.methods_text import describe_corrections
 from airborne.export.palette import STATUS_RGB, hex_colour
 from airborne.tracking import Status
@@ -68,7 +69,7 @@ def format_value(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.4g}"
+        return format_digits(value, 4)
     if isinstance(value, list):
         return ", ".join(map(format_value, value))
     return str(value)

@@ -88,14 +88,14 @@ def landmark_frame_sds(motion: Motion, model: BodyModel) -> Array:
 
 def landmark_jacobian(posed: PosedBody) -> Array:
     """Differentiate a body's landmarks, or the joints that they stand for, by its pose: (landmarks, 3, d)."""
-    owners = landmark_owners(posed.model)
+    owners = posed.model.landmark_segments
     moved = np.where(_at_joint(posed.model)[:, None], posed.t[owners], posed.landmarks)
     return point_jacobian(posed, owners, moved)
 
 
 def _place_variance(model: BodyModel) -> Array:
     """Return the variance of each landmark's place within its segment, a joint's within both: (landmarks,) [m2]."""
-    owners = landmark_owners(model)
+    owners = model.landmark_segments
     if not model.has_joints:
         return np.zeros(len(owners))
     sds = PLACE_SHARE * half_widths_m(model)
@@ -110,7 +110,7 @@ def joint_statuses(motion: Motion, model: BodyModel, sd: Array) -> NDArray[np.st
     and crossed legs that fewer than three cameras show make theirs.
     """
     status = np.repeat(motion.status.astype("<U9")[:, None], sd.shape[1], axis=1)
-    owners = landmark_owners(model)
+    owners = model.landmark_segments
     is_doubtful = ~(sd <= UNCERTAIN_SD_M) | _is_strained(motion, model)[:, _carriers(model)] | _may_swap(motion, model)
     is_doubtful |= np.pad(motion.uncertain_joints, ((0, 0), (1, 0)))[:, owners]
     status[(status == JointStatus.TRACKED.value) & is_doubtful] = JointStatus.UNCERTAIN.value
@@ -148,13 +148,8 @@ def count_statuses(status: NDArray[np.str_], model: BodyModel) -> dict[str, dict
 
 def _carriers(model: BodyModel) -> NDArray[np.int64]:
     """Return the segment whose joint moves each landmark, the parent of a segment for its origin: (landmarks,)."""
-    owners = landmark_owners(model)
+    owners = model.landmark_segments
     return np.where(_at_joint(model) & (owners > 0), model.parents[owners], owners)
-
-
-def landmark_owners(model: BodyModel) -> NDArray[np.int64]:
-    """Return the segment of each landmark: (landmarks,)."""
-    return np.array([model.index_of(landmark.segment) for landmark in model.landmarks], np.int64)
 
 
 def _at_joint(model: BodyModel) -> NDArray[np.bool_]:
@@ -178,7 +173,7 @@ def _may_swap(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     rows, crossed = np.flatnonzero(motion.has_pose & (motion.n_views < _SURE_VIEWS)), np.zeros(len(motion), np.bool_)
     joints_m = model.pose_segments(motion.R[rows], motion.position[rows], motion.joint_angles[rows])[1]
     crossed[rows] = are_crossed(model, joints_m)
-    owners = landmark_owners(model)
+    owners = model.landmark_segments
     return crossed[:, None] & np.isin(owners, [segment for legs in paired_legs(model) for segment in legs.ravel()])
 
 

@@ -95,10 +95,14 @@ def track_forward_backward(
         return
     yield from stretches.track(_HeldFrames([first]), first.index, None, None)
     n_held = max(int(_MOST_BYTES / max(first.n_bytes, 1)), _FEWEST_HELD)
-    while held := list(islice(source, n_held)):
+    held = list(islice(source, n_held))
+    while held:
+        following = list(islice(source, 1))
         step = held[1].index - held[0].index if len(held) > 1 else 1
         stretch = range(held[0].index, held[-1].index + step, step)
-        yield from stretches.track(_HeldFrames(held), stretch.start, stretch.stop, stretch, only_if_doubtful=True)
+        args = _HeldFrames(held), stretch.start, stretch.stop, stretch
+        yield from stretches.track(*args, only_if_doubtful=True, is_last=not following)
+        held = following + list(islice(source, n_held - 1)) if following else []
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +141,12 @@ class _Stretches:
         both_ways: range | None,
         *,
         only_if_doubtful: bool = False,
+        is_last: bool = False,
     ) -> Iterator[tuple[Frames, Estimate]]:
-        """Yield the frames from `start` to before `stop` with their estimates; `both_ways`, else forward alone."""
+        """Yield the frames from `start` to before `stop` with their estimates; `both_ways`, else forward alone.
+
+        Nothing is learned from the joined estimates of a stretch that `is_last`.
+        """
         ahead, learned = dict[int, Estimate](), None
         if both_ways is not None and any(frame not in self.known for frame in both_ways):
             ahead, learned = _track_both_ways(
@@ -160,7 +168,7 @@ class _Stretches:
                 self.write(estimate)
             self.n_done += 1
             is_tracked |= estimate.status is Status.TRACKED
-            if learned is None:
+            if learned is None and not is_last:
                 self.state = self.tracker.learn(self.state, observed, estimate)
             yield observed, estimate
         self.state = self.state if learned is None else learned

@@ -34,7 +34,7 @@ class PoseEvidence:
     def residuals(self, pose: Pose) -> tuple[Array, Array]:
         """Return rows (k, 6 + 3 joints) and values (k,), in sds: `rows @ delta` is how the values change."""
         posed, used = self.model.with_pose(pose), np.concatenate([self.landmarks, self.clicked])
-        owners = np.array([self.model.index_of(landmark.segment) for landmark in self.model.landmarks])[used]
+        owners = self.model.landmark_segments[used]
         points = posed.landmarks[used]
         jacobian = point_jacobian(posed, owners, points)
         n = len(self.landmarks)

@@ -63,7 +63,7 @@ def differences(model: BodyModel, forward: Estimate, backward: Estimate) -> Pass
     covariance = _covariance(forward, len(delta)) + _covariance(backward, len(delta))
     parts, here, there = parts_of(model), model.with_pose(forward.pose), model.with_pose(backward.pose)
     off_m, is_far = np.linalg.norm(here.landmarks - there.landmarks, axis=-1), np.zeros(len(model.segments), np.bool_)
-    is_far[[model.index_of(model.landmarks[k].segment) for k in np.flatnonzero(off_m > APART_M)]] = True
+    is_far[model.landmark_segments[off_m > APART_M]] = True
     part_of = np.unique(limb_of_segment(model), return_inverse=True)[1]
     apart = tuple(
         k

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
-from airborne.motion.joints import landmark_jacobian, landmark_owners, landmarks
+from airborne.motion.joints import landmark_jacobian, landmarks
 from airborne.motion.motion import Motion
 from airborne.motion.smoothing.run_fit import SmoothErrors
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
@@ -38,7 +38,7 @@ def constant_offsets(
 
     rows: of the motion, one for each pose.
     """
-    owners, poses, of_surface = landmark_owners(model), poses[kept], errors.of_surface[kept]
+    owners, poses, of_surface = model.landmark_segments, poses[kept], errors.of_surface[kept]
     moved_m = np.zeros((len(poses), len(owners), 3, of_surface.shape[-1]))
     is_known = np.zeros((len(poses), len(owners)), np.bool_)
     for i, (pose, covariance) in enumerate(zip(poses, errors.covariances[kept], strict=True)):

@@ -26,7 +26,7 @@ def forget_moved_limbs(model: BodyModel, tracked: Motion, fitted: Motion) -> Mot
     before, sd_m = landmarks(tracked, model)
     moved_m = np.linalg.norm(landmarks(fitted, model)[0] - before, axis=-1)
     contradicts = moved_m > np.maximum(DISTINCT_M, _CONTRADICTED_SDS * sd_m)
-    owners = np.array([model.index_of(landmark.segment) for landmark in model.landmarks])
+    owners = model.landmark_segments
     covariance = fitted.covariance.copy()
     for limb in limbs_of(model):
         columns = joints_of(model, limb).columns

@@ -228,19 +228,22 @@ def proximal_to_distal(model: BodyModel) -> list[DegreesOfFreedom]:
     return [DegreesOfFreedom(model, columns[distance[of_segment] <= stage]) for stage in range(distance.max() + 1)]
 
 
+@lru_cache(maxsize=16)
 def limb_of_segment(model: BodyModel) -> NDArray[np.int64]:
     """Return for each segment the first segment of its limb, -1 for those of the trunk: (segments,)."""
     distance, limb = _distance_from_trunk(model), np.full(len(model.segments), -1)
     for segment in np.flatnonzero(distance > 0):
         limb[segment] = segment if distance[segment] == 1 else limb[model.parents[segment]]
+    limb.flags.writeable = False
     return limb
 
 
-def limbs_of(model: BodyModel) -> list[NDArray[np.int64]]:
+@lru_cache(maxsize=16)
+def limbs_of(model: BodyModel) -> tuple[NDArray[np.int64], ...]:
     """Return the segments of each limb of more than one segment."""
     limb = limb_of_segment(model)
     limbs = [np.flatnonzero(limb == each) for each in np.unique(limb[limb >= 0])]
-    return [each for each in limbs if len(each) > 1]
+    return tuple(each for each in limbs if len(each) > 1)
 
 
 def joints_of(model: BodyModel, segments: NDArray[np.integer]) -> DegreesOfFreedom:

@@ -58,16 +58,27 @@ def find_misplaced_limbs(
     n = len(render_model.model.segments)
     posed, (pixels, inside, other) = render_model.with_pose(pose), np.zeros((3, len(regions), n))
     for row, (region, posterior) in enumerate(zip(regions, posteriors, strict=True)):
-        part = render_model.draw_parts(posed, region)
-        visible = part >= 0
-        owner, probability = render_model.segment_of_part[part[visible]], posterior[visible]
-        pixels[row] = np.bincount(owner, minlength=n)
-        inside[row] = np.bincount(owner, probability, minlength=n)
-        other[row] = np.bincount(owner, probability < _SURELY_OTHER, minlength=n)
+        part, segment_of_part = render_model.draw_parts(posed, region), render_model.segment_of_part
+        _count_pixels(part, segment_of_part, posterior, pixels[row], inside[row], other[row])
     precision, is_shown = inside.sum() / max(pixels.sum(), 1), pixels >= _FEWEST_PX
     is_misplaced = is_shown & (other > _MISPLACED * pixels)
     is_suspect = is_shown & (inside < _SUSPECT * precision * pixels)
     return LimbFaults(*(_limbs_with(render_model.model, each) for each in (is_suspect, is_misplaced)))
+
+
+@kernel
+def _count_pixels(part, segment_of_part, posterior, pixels, inside, other):
+    """Add to each segment's (n,) pixels, their probability to be body, and those that surely are something else.
+
+    part (h, w) as `draw_parts`, segment_of_part (parts,), posterior (h, w).
+    """
+    for y in range(part.shape[0]):
+        for x in range(part.shape[1]):
+            if part[y, x] >= 0:
+                owner, probability = segment_of_part[part[y, x]], posterior[y, x]
+                pixels[owner] += 1
+                inside[owner] += probability
+                other[owner] += probability < _SURELY_OTHER
 
 
 def _limbs_with(model: BodyModel, chosen: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
@@ -126,7 +137,7 @@ def is_same_place(model: BodyModel, pose: Pose, other: Pose, limb: NDArray[np.in
 
 def limb_points(model: BodyModel, bodies: Sequence[PosedBody], limb: NDArray[np.int64]) -> list[Array]:
     """Return where each posed body has a limb's joints and landmarks: (points, 3) world [m]."""
-    is_mark = np.isin([model.index_of(landmark.segment) for landmark in model.landmarks], limb)
+    is_mark = np.isin(model.landmark_segments, limb)
     return [np.concatenate([body.t[limb], body.landmarks[is_mark]]) for body in bodies]
 
 
