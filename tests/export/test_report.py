@@ -155,11 +155,12 @@ def test_keys_become_words_with_their_unit():
 
 
 def test_values_are_shown_as_a_reader_would_write_them():
-    assert [format_value(v) for v in (None, True, 3, 0.123456, [768, 576], "x")] == [
+    assert [format_value(v) for v in (None, True, 3, 0.123456, 12345.6, [768, 576], "x")] == [
         "not known",
         "yes",
         "3",
         "0.1235",
+        "12350",
         "768, 576",
         "x",
     ]
