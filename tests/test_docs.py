@@ -23,6 +23,7 @@ from airborne.evaluation.players import PartErrors
 from airborne.export.figures import write_figures
 from airborne.motion import covariance_file, flight_summary, measure_flight
 from airborne.motion.files import _header
+from airborne.motion.frame_file import FRAME_SD_FILE
 from airborne.motion.run_folder import SMOOTH_JOINTS, SMOOTH_RECORD, TABLES, TRACKED_MOTION, figures_of
 from airborne.run import smooth
 from airborne.run.body_tables import write_tables
@@ -305,7 +306,7 @@ def test_every_file_of_a_body_with_joints_is_documented(person, run):
     left = set(files_of(person[0])) - set(files_of(run))
     rows = table_of(RESULTS, "Files of a body with joints")
     covariances = {covariance_file.COVARIANCE_FILE, f"{TABLES}/{covariance_file.COVARIANCE_FILE}"}
-    of_whole_run = {TRACKED_MOTION, covariance_file.FRAME_SD_FILE}
+    of_whole_run = {TRACKED_MOTION, FRAME_SD_FILE}
     assert left | covariances | of_whole_run == {name for row in rows for name in named(row[0])}
 
 

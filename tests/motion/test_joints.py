@@ -116,8 +116,10 @@ def test_table_of_joint_angles_is_long_with_empty_cells_where_lost(tmp_path):
     write_joint_angles(tmp_path / "joint_angles.csv", motion, MODEL)
     with (tmp_path / "joint_angles.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    columns = "frame,time_s,joint,x_deg,y_deg,z_deg,x_deg_sd,y_deg_sd,z_deg_sd,is_singular,isb_sequence,"
-    columns += "isb_1_deg,isb_2_deg,isb_3_deg,isb_1_deg_sd,isb_2_deg_sd,isb_3_deg_sd,isb_is_singular"
+    columns = "frame,time_s,joint,x_deg,y_deg,z_deg,x_deg_sd,y_deg_sd,z_deg_sd,x_deg_sd_frame,y_deg_sd_frame,"
+    columns += "z_deg_sd_frame,is_singular,isb_sequence,"
+    columns += "isb_1_deg,isb_2_deg,isb_3_deg,isb_1_deg_sd,isb_2_deg_sd,isb_3_deg_sd,"
+    columns += "isb_1_deg_sd_frame,isb_2_deg_sd_frame,isb_3_deg_sd_frame,isb_is_singular"
     assert list(rows[0]) == columns.split(",")
     assert [row["joint"] for row in rows[:5]] == ["head", "arm", "hand", "leg", "head"]
     assert [row["x_deg"] == "" for row in rows[:12]] == [False] * 4 + [True] * 4 + [False] * 4

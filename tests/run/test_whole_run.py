@@ -122,7 +122,7 @@ def test_joints_err_less_than_frame_by_frame_and_say_so(run):
     assert fitted.surface == "ellipsoids"
     before, after = (np.trace(each.covariance[:, :3, :3], axis1=1, axis2=2) for each in (tracked, fitted.motion))
     assert (after < 0.8 * before).all()
-    whole, by_frame = landmarks(fitted.motion, run.model)[1], fitted.motion.landmark_frame_sd
+    whole, by_frame = landmarks(fitted.motion, run.model)[1], fitted.motion.by_frame.landmark_m
     assert (by_frame < whole).mean() > 0.95 and (by_frame > 0.2 * whole).all()
     assert fitted.motion.status.tolist() == tracked.status.tolist()
 

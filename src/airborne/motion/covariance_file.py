@@ -18,7 +18,6 @@ from airborne.types import Array
 
 COVARIANCE_FILE = "covariance.bin"
 LASTING_FILE = "lasting.bin"  # the same of the root's errors that last all run long (6, 6), of any body
-FRAME_SD_FILE = "frame_sd.bin"  # the sds of landmarks' errors that change from frame to frame, a row each
 _FLOAT = np.dtype("<f8")
 
 
@@ -53,26 +52,6 @@ def write_covariances(path: Path, covariances: Array) -> None:
     unfinished = path.with_name(path.name + ".part")
     unfinished.write_bytes(covariances[:, rows, columns].astype(_FLOAT).tobytes())
     unfinished.replace(path)
-
-
-def write_frame_sds(motion_file: Path, sds: Array | None) -> None:
-    """Write the sds (n, landmarks) [m] of what changes by frame beside motion.csv; None removes them."""
-    path = motion_file.with_name(FRAME_SD_FILE)
-    if sds is None:
-        path.unlink(missing_ok=True)
-        return
-    unfinished = path.with_name(path.name + ".part")
-    unfinished.write_bytes(sds.astype(_FLOAT).tobytes())
-    unfinished.replace(path)
-
-
-def read_frame_sds(motion_file: Path, n: int) -> Array | None:
-    """Read the same of n frames; None without a file, or where that is not of so many."""
-    path = motion_file.with_name(FRAME_SD_FILE)
-    data = path.read_bytes() if path.is_file() else b""
-    if not n or not data or len(data) % (n * _FLOAT.itemsize):
-        return None
-    return np.frombuffer(data, _FLOAT).reshape(n, -1)
 
 
 def read_covariances(path: Path, n: int, *, size: int, first: int = 0) -> Array:

@@ -26,10 +26,9 @@ from airborne.motion.covariance_file import (
     LASTING_FILE,
     CovarianceWriter,
     read_covariances,
-    read_frame_sds,
     write_covariances,
-    write_frame_sds,
 )
+from airborne.motion.frame_file import read_frame_deviations, write_frame_deviations
 from airborne.motion.motion import Motion, rigid_transform
 from airborne.motion.tables import cell, motion_columns
 from airborne.tracking import Doubt, Estimate, Status
@@ -106,7 +105,7 @@ def read_motion(path: Path) -> Motion:
     joints, estimates = _parse(path)
     lasting = read_covariances(path.with_name(LASTING_FILE), len(estimates), size=6)
     motion = Motion.collect(sorted(estimates, key=lambda estimate: estimate.index), joints)
-    motion = replace(motion, landmark_frame_sd=read_frame_sds(path, len(motion)))
+    motion = replace(motion, by_frame=read_frame_deviations(path, len(motion), len(joints)))
     return motion if np.isnan(lasting).any() else replace(motion, lasting=lasting)
 
 
@@ -120,7 +119,7 @@ def revise_motion(path: Path, motion: Motion) -> None:
     lines = [header, *map(",".join, _cells(motion, [line.split(",")[exact] for line in rows]))]
     if motion.lasting is not None:
         write_covariances(path.with_name(LASTING_FILE), motion.lasting)
-    write_frame_sds(path, motion.landmark_frame_sd)
+    write_frame_deviations(path, motion.by_frame)
     unfinished = path.with_name(path.name + ".part")
     unfinished.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     if motion.joints:

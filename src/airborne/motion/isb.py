@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.geometry.axis_sequences import angles_from_rotation, continue_angles, is_singular, sequence_angles
@@ -75,18 +76,18 @@ def isb_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
         turned = R[:, path[0]] if len(path) == 1 else R[:, path[0]] @ R[:, joint]
         angles[:, joint] = continue_angles(sequence_angles(turned, axes), axes)
         singular[:, joint] = is_singular(angles[:, joint], axes)
-        own = angles_from_rotation(angles[:, joint], axes)
-        jacobian = np.concatenate([own @ np.swapaxes(R[:, joint], -1, -2), own][-len(path) :], axis=-1)
-        columns = np.concatenate([np.arange(6 + 3 * k, 9 + 3 * k) for k in path])
+        columns, jacobian = _gradient(angles[:, joint], axes, R[:, joint], path)
         for row in np.flatnonzero(motion.has_pose):
-            covariance = motion.covariance[row][np.ix_(columns, columns)]
+            covariance = motion.covariance[row][np.ix_(6 + columns, 6 + columns)]
             variance[row, joint] = propagate_variances(jacobian[row], covariance)
         angles[:, joint, 2] += sequence.third_at_zero_rad
     variance[variance > OPEN_SD_RAD**2] = np.inf
+    sd, by_frame = standard_deviation(variance), motion.by_frame
     dimensions = ("time", "joint", "rotation")
     variables = {
         "isb_angle": (dimensions, np.rad2deg(angles), {"units": "deg", "order": "as isb_sequence, body-fixed"}),
-        "isb_angle_sd": (dimensions, np.rad2deg(standard_deviation(variance)), {"units": "deg"}),
+        "isb_angle_sd": (dimensions, np.rad2deg(sd), {"units": "deg"}),
+        "isb_angle_sd_frame": (dimensions, np.rad2deg(sd if by_frame is None else by_frame.isb_rad), {"units": "deg"}),
         "isb_is_singular": (dimensions[:2], singular),
         "isb_sequence": (dimensions[1:2], np.array(names)),
     }
@@ -96,6 +97,30 @@ def isb_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
         "rotation": [1, 2, 3],
     }
     return xr.Dataset(variables, coordinates)
+
+
+def isb_gradients(model: BodyModel, joint_angles: Array) -> list[tuple[NDArray[np.int64], Array]]:
+    """Differentiate the angles of each joint by the rotation vectors of joints in their segments' axes.
+
+    joint_angles (n, joints, 3) x-y-z [rad]. Of each joint the columns (c,) of (3 joints,) and (n, 3, c), NaN without a
+    sequence, up to the sign.
+    """
+    R, gradients = matrix_from_angles(joint_angles), []
+    for joint, segment in enumerate(model.segments[1:]):
+        sequence, path = _OF_SEGMENT.get(segment.name), _joints_between(model, joint)
+        if sequence is None:
+            gradients.append((3 * joint + np.arange(3), np.full((len(R), 3, 3), np.nan)))
+            continue
+        turned = R[:, path[0]] if len(path) == 1 else R[:, path[0]] @ R[:, joint]
+        gradients.append(_gradient(sequence_angles(turned, sequence.axes), sequence.axes, R[:, joint], path))
+    return gradients
+
+
+def _gradient(angles: Array, axes: Array, R: Array, path: list[int]) -> tuple[NDArray[np.int64], Array]:
+    """Return the columns (c,) of a path's joints, and the derivatives (n, 3, c) of its angles (n, 3) by them."""
+    own = angles_from_rotation(angles, axes)
+    jacobian = np.concatenate([own @ np.swapaxes(R, -1, -2), own][-len(path) :], axis=-1)
+    return np.concatenate([np.arange(3 * k, 3 * k + 3) for k in path]), jacobian
 
 
 def _joints_between(model: BodyModel, joint: int) -> list[int]:

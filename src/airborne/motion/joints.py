@@ -81,8 +81,8 @@ def landmark_frame_sds(motion: Motion, model: BodyModel) -> Array:
     After the fit of a whole run, without what is constant in each one's segment; else without the root's lasting errors
     alone. Raises ResultError for another body.
     """
-    if motion.landmark_frame_sd is not None:
-        return motion.landmark_frame_sd
+    if motion.by_frame is not None:
+        return motion.by_frame.landmark_m
     return landmarks(replace(motion, lasting=None), model)[1]
 
 
@@ -197,16 +197,15 @@ def joint_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
 
     Intrinsic x-y-z Cardan angles, parent from segment: R = Rx Ry Rz; a joint has the name of the segment that it
     rotates. Standard deviations follow from the covariance to first order: infinite where an unobserved rotation moves
-    the angle, NaN where unknown, and within 5 degrees of y = +-90 (`is_singular`), where x and z are ambiguous.
+    the angle, NaN where unknown, and within 5 degrees of y = +-90 (`is_singular`), where x and z are ambiguous. What
+    changes from frame to frame, `angle_sd_frame`, is known apart after the fit of a whole run.
     Raises ResultError for another body's motion.
     """
     import xarray as xr
 
     require_body(motion, model)
     radians = continuous_angles(motion)
-    matrix = matrix_from_angles(radians)
-    principal = angles_from_matrix(matrix)  # y within +-90 degrees; the other branch has the same sd
-    by_rotation_vector = angles_from_world_rotation(principal) @ matrix
+    by_rotation_vector = angle_gradients(radians)
     variance = np.full(radians.shape, np.nan)
     for row in np.flatnonzero(motion.has_pose):
         for joint in range(len(motion.joints)):
@@ -215,11 +214,13 @@ def joint_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
                 by_rotation_vector[row, joint], motion.covariance[row, block, block]
             )
     variance[variance > OPEN_SD_RAD**2] = np.inf
+    sd, by_frame = standard_deviation(variance), motion.by_frame
     dimensions = ("time", "joint", "axis")
     variables = {
         "angle": (dimensions, np.rad2deg(radians), {"units": "deg", "order": "x, y, z, body-fixed"}),
-        "angle_sd": (dimensions, np.rad2deg(standard_deviation(variance)), {"units": "deg"}),
-        "is_singular": (dimensions[:2], is_near_singular(principal)),
+        "angle_sd": (dimensions, np.rad2deg(sd), {"units": "deg"}),
+        "angle_sd_frame": (dimensions, np.rad2deg(sd if by_frame is None else by_frame.angle_rad), {"units": "deg"}),
+        "is_singular": (dimensions[:2], is_near_singular(angles_from_matrix(matrix_from_angles(radians)))),
     }
     coordinates = {
         "time": ("time", motion.time_s, {"units": "s"}),
@@ -228,6 +229,15 @@ def joint_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
         "axis": list("xyz"),
     }
     return xr.Dataset(variables, coordinates, {"history": ["joint_angles: continuous over time"]})
+
+
+def angle_gradients(joint_angles: Array) -> Array:
+    """Differentiate x-y-z angles (..., 3) [rad] by a rotation vector in the turned segment's axes: (..., 3, 3).
+
+    With y within +-90 degrees; of the other branch some have the other sign.
+    """
+    matrix = matrix_from_angles(joint_angles)
+    return angles_from_world_rotation(angles_from_matrix(matrix)) @ matrix
 
 
 def require_body(motion: Motion, model: BodyModel) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,14 @@ from airborne.errors import count
 from airborne.motion.uncertainty import standard_deviation
 from airborne.tracking import Estimate, Status
 from airborne.types import Array
+
+
+class FrameDeviations(NamedTuple):
+    """Standard deviations of errors that change from frame to frame, without what lasts all run long."""
+
+    landmark_m: Array  # (n, landmarks) root mean square over the axes
+    angle_rad: Array  # (n, joints, 3) of the x-y-z angles
+    isb_rad: Array  # (n, joints, 3) of the angles in ISB's sequences
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,7 +48,7 @@ class Motion:
     doubts: NDArray[np.str_]  # (n,) why frames are uncertain: values of `Doubt`, separated by slashes; "" for others
     uncertain_joints: NDArray[np.bool_]  # (n, joints) that may be elsewhere, whatever the covariance says
     lasting: Array | None = None  # (n, 6, 6) of the root's errors that last, or make its path rough
-    landmark_frame_sd: Array | None = None  # (n, landmarks) [m] of errors that change by frame, of a fitted run
+    by_frame: FrameDeviations | None = None  # of a run that was fitted as a whole
 
     @classmethod
     def collect(cls, estimates: Sequence[Estimate], joints: tuple[str, ...] = ()) -> Motion:

@@ -111,12 +111,14 @@ def write_joint_angles(path: Path, motion: Motion, model: BodyModel) -> None:
     table = joint_angles(motion, model)
     columns = _long(motion, np.array(motion.joints, np.str_))
     columns |= {f"{axis}_deg": table["angle"].sel(axis=axis).to_numpy().ravel() for axis in "xyz"}
-    columns |= {f"{axis}_deg_sd": table["angle_sd"].sel(axis=axis).to_numpy().ravel() for axis in "xyz"}
+    for sd in ("sd", "sd_frame"):
+        columns |= {f"{axis}_deg_{sd}": table[f"angle_{sd}"].sel(axis=axis).to_numpy().ravel() for axis in "xyz"}
     columns["is_singular"] = table["is_singular"].to_numpy().astype(int).ravel()
     isb = isb_angles(motion, model)
     columns["isb_sequence"] = np.tile(isb["isb_sequence"].to_numpy(), len(motion))
     columns |= {f"isb_{k}_deg": isb["isb_angle"].sel(rotation=k).to_numpy().ravel() for k in (1, 2, 3)}
-    columns |= {f"isb_{k}_deg_sd": isb["isb_angle_sd"].sel(rotation=k).to_numpy().ravel() for k in (1, 2, 3)}
+    for sd in ("sd", "sd_frame"):
+        columns |= {f"isb_{k}_deg_{sd}": isb[f"isb_angle_{sd}"].sel(rotation=k).to_numpy().ravel() for k in (1, 2, 3)}
     _write_csv(path, columns | {"isb_is_singular": isb["isb_is_singular"].to_numpy().astype(int).ravel()})
 
 

@@ -19,8 +19,9 @@ from airborne.export import write_json
 from airborne.io.files import file_digest
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
 from airborne.motion import drop_rows
-from airborne.motion.covariance_file import COVARIANCE_FILE, FRAME_SD_FILE, LASTING_FILE
+from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
 from airborne.motion.files import copy_motion, remove_motion
+from airborne.motion.frame_file import FRAME_SD_FILE
 from airborne.motion.run_folder import (
     AGREEMENT,
     AGREEMENT_METHODS,

@@ -98,7 +98,7 @@ def fit_whole_run(
             covariance[row] = each
     fitted = replace(motion, position=position, R=R, joint_angles=angles, covariance=covariance)
     fitted = count_moves_as_errors(model, motion, forget_moved_limbs(model, motion, fitted))
-    fitted = replace(fitted, landmark_frame_sd=frame_deviations(fitted, model, offsets))
+    fitted = replace(fitted, by_frame=frame_deviations(fitted, model, offsets))
     return FittedRun(fitted, "skin" if images.is_skin else "ellipsoids")
 
 
