@@ -1,5 +1,6 @@
 """The fit of a person's whole run: joints err less than frame by frame, in windows too; keys and unknowns stay."""
 
+import csv
 import re
 import shutil
 from dataclasses import replace
@@ -12,7 +13,8 @@ from airborne.body.chain import move_pose
 from airborne.cameras import Rig
 from airborne.motion import Motion, landmarks
 from airborne.motion.files import read_motion
-from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY, TRACKED_MOTION
+from airborne.motion.frame_file import FRAME_SD_FILE
+from airborne.motion.run_folder import JOINT_ANGLES, JOINTS, MOTION, SUMMARY, TRACKED_MOTION, read_body_run
 from airborne.motion.smoothing.segments import MIN_FRAMES
 from airborne.run import whole_run
 from airborne.run.opening import open_trial
@@ -180,8 +182,22 @@ def test_a_run_that_ended_or_was_killed_in_its_fit_goes_on_from_what_was_tracked
     (again / SUMMARY).unlink()
     (again / MOTION).write_bytes((again / MOTION).read_bytes()[:-40])  # torn; covariance.bin is the fit's already
     assert in_process("track", short, "-o", again, "--no-pictures", "--resume") == 0
-    for name in (MOTION, JOINTS, TRACKED_MOTION):
+    for name in (MOTION, JOINTS, TRACKED_MOTION, FRAME_SD_FILE):
         assert (again / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_deviations_by_frame_stand_in_the_tables_and_a_cut_file_of_them_is_left_out(whole, tmp_path):
+    shutil.copytree(whole, tmp_path / "cut")
+    (motion, _), file = read_body_run(whole), tmp_path / "cut" / FRAME_SD_FILE
+    with (whole / JOINTS).open(newline="") as table:
+        in_table = [float(row["sd_frame_m"]) for row in csv.DictReader(table)]
+    np.testing.assert_array_equal(in_table, motion.by_frame.landmark_m.ravel())
+    with (whole / JOINT_ANGLES).open(newline="") as table:
+        in_table = [float(row["y_deg_sd_frame"]) for row in csv.DictReader(table)]
+    np.testing.assert_array_equal(in_table, np.rad2deg(motion.by_frame.angle_rad[..., 1].ravel()))
+    file.write_bytes(file.read_bytes()[: -8 * len(motion)])
+    assert read_motion(tmp_path / "cut" / MOTION).by_frame is not None
+    assert read_body_run(tmp_path / "cut")[0].by_frame is None
 
 
 def test_a_refused_resume_leaves_a_fitted_run_as_it_is(short, whole, tmp_path, capsys):

@@ -20,8 +20,8 @@ from airborne.evaluation.coverage import Coverage, coverage_of
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.evaluation.mix_ups import Paths, question_mix_up
 from airborne.evaluation.times import best_time_shift, match_times, span
-from airborne.motion import JointStatus, Motion, joint_statuses, landmarks
-from airborne.motion.joints import landmark_frame_sds
+from airborne.motion import JointStatus, Motion, joint_statuses
+from airborne.motion.joints import landmarks_with_frame_sds
 from airborne.tracking import Status
 from airborne.types import Array, Triple
 
@@ -145,12 +145,11 @@ def compare_joints(
             f"no pose to compare: motion {span(motion.time_s)} with {int(motion.has_pose.sum())} poses, "
             f"reference {span(reference.time_s)}; give the joints of this recording"
         )
-    points, all_sd = landmarks(motion, model)
+    points, all_sd, sd_by_frame = landmarks_with_frame_sds(motion, model)
     joint_status = joint_statuses(motion, model, all_sd)[:, columns]
     measured, sd = points[:, columns], all_sd[:, columns]
-    if smooth is None:
-        sd_by_frame = landmark_frame_sds(motion, model)[:, columns]
-    else:
+    sd_by_frame = sd_by_frame[:, columns]
+    if smooth is not None:
         measured, sd = _match_smooth(motion, smooth, names)
         sd_by_frame = np.full(sd.shape, np.nan)  # they are not told apart
     R = _rotations(motion, model, columns)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airborne.errors import ResultError
 from airborne.motion.motion import FrameDeviations
 
 FRAME_SD_FILE = "frame_sd.bin"
@@ -29,9 +30,15 @@ def write_frame_deviations(motion_file: Path, deviations: FrameDeviations | None
 
 
 def read_frame_deviations(motion_file: Path, n: int, n_joints: int) -> FrameDeviations | None:
-    """Read the deviations of n frames; None without a file, or where that is not of so many."""
+    """Read the deviations of n frames; None without a file, or where that is not of so many.
+
+    Raises ResultError where it cannot be read.
+    """
     path = motion_file.with_name(FRAME_SD_FILE)
-    data = path.read_bytes() if path.is_file() else b""
+    try:
+        data = path.read_bytes() if path.is_file() else b""
+    except OSError as error:
+        raise ResultError(f"{path} cannot be read ({error.strerror}); repair it, or remove it to go without") from None
     if not n or not data or len(data) % (n * _FLOAT.itemsize):
         return None
     rows = np.frombuffer(data, _FLOAT).reshape(n, -1)

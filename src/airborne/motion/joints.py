@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from enum import StrEnum
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -66,24 +65,28 @@ def landmarks(motion: Motion, model: BodyModel) -> tuple[Array, Array]:
     point, or the joint that it stands for, and by where that lies within a person: infinite where an unobserved
     direction moves it, NaN where unknown. Raises ResultError for another body.
     """
+    points, sd, _ = landmarks_with_frame_sds(motion, model)
+    return points, sd
+
+
+def landmarks_with_frame_sds(motion: Motion, model: BodyModel) -> tuple[Array, Array, Array]:
+    """Return `landmarks`, and the sd of errors that change from frame to frame: (n, landmarks) [m].
+
+    After the fit of a whole run that is without what is constant in each one's segment, else without the root's lasting
+    errors alone. Raises ResultError for another body.
+    """
     require_body(motion, model)
-    points = np.full((len(motion), len(model.landmarks), 3), np.nan)
-    variance, covariance = np.full(points.shape, np.nan), motion.total_covariance
+    points, covariances = np.full((len(motion), len(model.landmarks), 3), np.nan), [motion.total_covariance]
+    if motion.lasting is not None and motion.by_frame is None:
+        covariances.append(motion.covariance)
+    variances = np.full((len(covariances), *points.shape), np.nan)
     for row in np.flatnonzero(motion.has_pose):
         posed = model.with_pose(motion.pose(row))
-        points[row], variance[row] = posed.landmarks, propagate_variances(landmark_jacobian(posed), covariance[row])
-    return points, standard_deviation(variance.mean(axis=-1) + _place_variance(model))
-
-
-def landmark_frame_sds(motion: Motion, model: BodyModel) -> Array:
-    """Return the sd of those errors of the landmarks that change from frame to frame: (n, landmarks) [m].
-
-    After the fit of a whole run, without what is constant in each one's segment; else without the root's lasting errors
-    alone. Raises ResultError for another body.
-    """
-    if motion.by_frame is not None:
-        return motion.by_frame.landmark_m
-    return landmarks(replace(motion, lasting=None), model)[1]
+        jacobian, points[row] = landmark_jacobian(posed), posed.landmarks
+        for variance, covariance in zip(variances, covariances, strict=True):
+            variance[row] = propagate_variances(jacobian, covariance[row])
+    sds = standard_deviation(variances.mean(axis=-1) + _place_variance(model))
+    return points, sds[0], sds[-1] if motion.by_frame is None else motion.by_frame.landmark_m
 
 
 def landmark_jacobian(posed: PosedBody) -> Array:

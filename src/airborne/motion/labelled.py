@@ -10,7 +10,7 @@ import xarray as xr
 from airborne.body import BodyModel
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.isb import isb_angles
-from airborne.motion.joints import joint_angles, joint_statuses, landmark_frame_sds, landmarks
+from airborne.motion.joints import joint_angles, joint_statuses, landmarks_with_frame_sds
 from airborne.motion.jumps.jump import Jump
 from airborne.motion.jumps.table import JUMP_COLUMNS, jump_row
 from airborne.motion.motion import Motion
@@ -50,15 +50,15 @@ def label_root(motion: Motion, history: Sequence[str] = ()) -> xr.Dataset:
 def label_joints(motion: Motion, model: BodyModel) -> xr.Dataset:
     """Label a body's landmarks: `position` (time, joint, space) [m], `position_sd` (time, joint) [m], `status` (time).
 
-    `position_sd_frame` (time, joint) [m] is that of errors which change from frame to frame, see `landmark_frame_sds`.
-    `joint_status` (time, joint) is each landmark's own, see `joint_statuses`. NaN where lost; see `landmarks` for the
-    standard deviations. Raises ResultError for another body's motion.
+    `position_sd_frame` (time, joint) [m] is that of errors which change from frame to frame; see
+    `landmarks_with_frame_sds` for both. `joint_status` (time, joint) is each landmark's own, see `joint_statuses`. NaN
+    where lost. Raises ResultError for another body's motion.
     """
-    points, sd = landmarks(motion, model)
+    points, sd, sd_frame = landmarks_with_frame_sds(motion, model)
     variables = {
         "position": (("time", "joint", "space"), points, _METRES),
         "position_sd": (("time", "joint"), sd, _SD),
-        "position_sd_frame": (("time", "joint"), landmark_frame_sds(motion, model), _SD),
+        "position_sd_frame": (("time", "joint"), sd_frame, _SD),
         "status": (("time",), motion.status, {"of": "frame"}),
         "joint_status": (("time", "joint"), joint_statuses(motion, model, sd), {"of": "joint"}),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +98,10 @@ def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:
             f"{folder / 'body.toml'} is missing, the body that was tracked; put the trial's body file there, "
             "or track again"
         )
-    return motion, read_body(folder / BODY)
+    model = read_body(folder / BODY)
+    if motion.by_frame is not None and motion.by_frame.landmark_m.shape[1] != len(model.landmarks):  # it was cut
+        motion = replace(motion, by_frame=None)
+    return motion, model
 
 
 def read_players_run(folder: Path) -> PlayersMotion:

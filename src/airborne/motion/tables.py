@@ -13,7 +13,7 @@ from airborne.io.parquet import CAN_WRITE_PARQUET, write_parquet
 from airborne.io.writing import write_text
 from airborne.motion.angles import ROOT_ANGLES, root_angles
 from airborne.motion.isb import isb_angles
-from airborne.motion.joints import joint_angles, joint_statuses, landmark_frame_sds, landmarks
+from airborne.motion.joints import joint_angles, joint_statuses, landmarks_with_frame_sds
 from airborne.motion.motion import Motion
 from airborne.types import Array
 
@@ -91,11 +91,10 @@ def write_joints(path: Path, motion: Motion, model: BodyModel) -> NDArray[np.str
 
     `sd_m` is the root mean square, over the three axes, of the point's standard deviations, propagated from the
     covariance through every joint that moves it; infinite where a direction that moves it is unobserved. `sd_frame_m`
-    is that of errors which change from frame to frame, see `landmark_frame_sds`. `status` is the joint's own, (n,
+    is that of errors which change from frame to frame, see `landmarks_with_frame_sds`. `status` is the joint's own, (n,
     landmarks): see `joint_statuses`.
     """
-    points, sd = landmarks(motion, model)
-    sd_frame = landmark_frame_sds(motion, model)
+    points, sd, sd_frame = landmarks_with_frame_sds(motion, model)
     status = joint_statuses(motion, model, sd)
     names = np.array([landmark.name for landmark in model.landmarks])
     columns = _long(motion, names) | {f"{axis}_m": points[..., k].ravel() for k, axis in enumerate("xyz")}

@@ -124,7 +124,8 @@ def check_run(
     lasting = None if found is None else found.lasting_at(motion.index)
     if rough.max() > 1:  # beside what the frames say themselves, which a run that is resumed keeps
         lasting = excess if lasting is None else lasting + excess
-    checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_), lasting=lasting)
+    checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_))
+    checked = replace(checked, lasting=lasting, by_frame=None)  # what is beside the table may be of an end before
     return CheckedRun(checked, found, tuple(sentences), wrong, is_start_wrong)
 
 

@@ -10,7 +10,7 @@ from airborne.body.human import human18
 from airborne.motion import landmarks
 from airborne.motion.frame_file import FRAME_SD_FILE, read_frame_deviations, write_frame_deviations
 from airborne.motion.isb import isb_angles, isb_gradients
-from airborne.motion.joints import _place_variance, angle_gradients, joint_angles, landmark_frame_sds
+from airborne.motion.joints import _place_variance, angle_gradients, joint_angles, landmarks_with_frame_sds
 from airborne.motion.motion import FrameDeviations
 from airborne.motion.smoothing.frame_errors import constant_offsets, frame_deviations
 from airborne.motion.smoothing.run_fit import SmoothErrors
@@ -118,12 +118,13 @@ def test_the_file_keeps_every_bit_and_a_cut_one_is_no_file(tmp_path, text):
 def test_a_motion_that_was_not_fitted_leaves_out_the_roots_lasting_errors_alone():
     motion = moved(surface_errors())
     wide = replace(motion, lasting=np.tile(np.diag([0.05**2] * 3 + [0.0] * 3), (N, 1, 1)))
-    np.testing.assert_array_equal(landmark_frame_sds(wide, HUMAN), landmarks(motion, HUMAN)[1])
+    np.testing.assert_array_equal(landmarks_with_frame_sds(wide, HUMAN)[2], landmarks(motion, HUMAN)[1])
     table = joint_angles(wide, HUMAN)
     np.testing.assert_array_equal(table["angle_sd_frame"], table["angle_sd"])
     found = deviations(surface_errors(), slice(0, N))
     fitted = replace(wide, by_frame=found)
-    assert landmark_frame_sds(fitted, HUMAN) is found.landmark_m
+    assert landmarks_with_frame_sds(fitted, HUMAN)[2] is found.landmark_m
+    np.testing.assert_array_equal(landmarks_with_frame_sds(wide, HUMAN)[1], landmarks(wide, HUMAN)[1])
     np.testing.assert_array_equal(joint_angles(fitted, HUMAN)["angle_sd_frame"], np.degrees(found.angle_rad))
     np.testing.assert_array_equal(isb_angles(fitted, HUMAN)["isb_angle_sd_frame"], np.degrees(found.isb_rad))
 
