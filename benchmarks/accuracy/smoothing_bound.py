@@ -54,7 +54,7 @@ def measure(name: str, folder: Path) -> list[dict]:
         if estimate.pose is not None and state.past:
             found[frames.index] = estimate
         state = tracker.learn(state, frames, estimate)
-    state, passes, last = tracker.turn(state), list[Passes](), max(found)
+    state, passes, last = tracker.turn(state, {}), list[Passes](), max(found)  # which looks at every frame anew
     for frames in reader.backward(run.recording.start, last):
         turned = turn_time(frames)
         back = tracker.search(state, turned)
