@@ -18,7 +18,7 @@ from airborne.types import Array
 
 COVARIANCE_FILE = "covariance.bin"
 LASTING_FILE = "lasting.bin"  # the same of the root's errors that last all run long (6, 6), of any body
-_FLOAT = np.dtype("<f8")
+FLOAT = np.dtype("<f8")
 
 
 class CovarianceWriter:
@@ -37,7 +37,7 @@ class CovarianceWriter:
     def append(self, covariance: Array) -> None:
         """Write one covariance (size, size) and wait until it is on disk."""
         with explain_full_disk(self._path):
-            self._file.write(covariance[self._upper].astype(_FLOAT).tobytes())
+            self._file.write(covariance[self._upper].astype(FLOAT).tobytes())
             self._file.flush()
             os.fsync(self._file.fileno())
 
@@ -49,8 +49,13 @@ class CovarianceWriter:
 def write_covariances(path: Path, covariances: Array) -> None:
     """Write covariances (n, size, size) at once; a file that is there stays whole until they are."""
     rows, columns = np.triu_indices(covariances.shape[-1])
+    write_rows(path, covariances[:, rows, columns])
+
+
+def write_rows(path: Path, rows: Array) -> None:
+    """Write rows of numbers (n, k) at once; a file that is there stays whole until they are."""
     unfinished = path.with_name(path.name + ".part")
-    unfinished.write_bytes(covariances[:, rows, columns].astype(_FLOAT).tobytes())
+    unfinished.write_bytes(rows.astype(FLOAT).tobytes())
     unfinished.replace(path)
 
 
@@ -70,11 +75,11 @@ def read_covariances(path: Path, n: int, *, size: int, first: int = 0) -> Array:
     except OSError as error:
         raise ResultError(f"{path} cannot be read ({error.strerror}); repair it, or remove it to go without") from None
     n_whole = len(data) // _row_bytes(size)
-    rows = np.frombuffer(data, _FLOAT, n_whole * len(upper[0])).reshape(n_whole, len(upper[0]))
+    rows = np.frombuffer(data, FLOAT, n_whole * len(upper[0])).reshape(n_whole, len(upper[0]))
     for covariance, row in zip(covariances, rows, strict=False):
         covariance[upper] = covariance.T[upper] = row
     return covariances
 
 
 def _row_bytes(size: int) -> int:
-    return _FLOAT.itemsize * (size * (size + 1) // 2)
+    return FLOAT.itemsize * (size * (size + 1) // 2)

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from airborne.errors import ResultError
+from airborne.motion.covariance_file import FLOAT, write_rows
 from airborne.motion.motion import FrameDeviations
 
 FRAME_SD_FILE = "frame_sd.bin"
-_FLOAT = np.dtype("<f8")
 
 
 def write_frame_deviations(motion_file: Path, deviations: FrameDeviations | None) -> None:
@@ -23,10 +23,7 @@ def write_frame_deviations(motion_file: Path, deviations: FrameDeviations | None
     if deviations is None:
         path.unlink(missing_ok=True)
         return
-    rows = np.concatenate([each.reshape(len(each), -1) for each in deviations], axis=1)
-    unfinished = path.with_name(path.name + ".part")
-    unfinished.write_bytes(rows.astype(_FLOAT).tobytes())
-    unfinished.replace(path)
+    write_rows(path, np.concatenate([each.reshape(len(each), -1) for each in deviations], axis=1))
 
 
 def read_frame_deviations(motion_file: Path, n: int, n_joints: int) -> FrameDeviations | None:
@@ -39,9 +36,9 @@ def read_frame_deviations(motion_file: Path, n: int, n_joints: int) -> FrameDevi
         data = path.read_bytes() if path.is_file() else b""
     except OSError as error:
         raise ResultError(f"{path} cannot be read ({error.strerror}); repair it, or remove it to go without") from None
-    if not n or not data or len(data) % (n * _FLOAT.itemsize):
+    if not n or not data or len(data) % (n * FLOAT.itemsize):
         return None
-    rows = np.frombuffer(data, _FLOAT).reshape(n, -1)
+    rows = np.frombuffer(data, FLOAT).reshape(n, -1)
     n_landmarks = rows.shape[1] - 6 * n_joints
     if n_landmarks < 0:
         return None

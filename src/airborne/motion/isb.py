@@ -9,6 +9,7 @@ that its angles have the meaning of the right side's.
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -73,8 +74,7 @@ def isb_angles(motion: Motion, model: BodyModel) -> xr.Dataset:
             continue
         names[joint], axes = sequence.name, sequence.axes
         path = _joints_between(model, joint)
-        turned = R[:, path[0]] if len(path) == 1 else R[:, path[0]] @ R[:, joint]
-        angles[:, joint] = continue_angles(sequence_angles(turned, axes), axes)
+        angles[:, joint] = continue_angles(sequence_angles(_rotation_along(R, path), axes), axes)
         singular[:, joint] = is_singular(angles[:, joint], axes)
         columns, jacobian = _gradient(angles[:, joint], axes, R[:, joint], path)
         for row in np.flatnonzero(motion.has_pose):
@@ -111,9 +111,14 @@ def isb_gradients(model: BodyModel, joint_angles: Array) -> list[tuple[NDArray[n
         if sequence is None:
             gradients.append((3 * joint + np.arange(3), np.full((len(R), 3, 3), np.nan)))
             continue
-        turned = R[:, path[0]] if len(path) == 1 else R[:, path[0]] @ R[:, joint]
-        gradients.append(_gradient(sequence_angles(turned, sequence.axes), sequence.axes, R[:, joint], path))
+        angles = sequence_angles(_rotation_along(R, path), sequence.axes)
+        gradients.append(_gradient(angles, sequence.axes, R[:, joint], path))
     return gradients
+
+
+def _rotation_along(R: Array, path: list[int]) -> Array:
+    """Return the rotations (n, 3, 3) of a path of joints, of those of all joints (n, joints, 3, 3)."""
+    return reduce(np.matmul, (R[:, joint] for joint in path))
 
 
 def _gradient(angles: Array, axes: Array, R: Array, path: list[int]) -> tuple[NDArray[np.int64], Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -155,6 +156,7 @@ def _carriers(model: BodyModel) -> NDArray[np.int64]:
     return np.where(_at_joint(model) & (owners > 0), model.parents[owners], owners)
 
 
+@lru_cache(maxsize=16)  # asked for in every frame
 def _at_joint(model: BodyModel) -> NDArray[np.bool_]:
     """Return which landmarks stand for their segments' joints: (landmarks,)."""
     return np.array([landmark.at_joint for landmark in model.landmarks])

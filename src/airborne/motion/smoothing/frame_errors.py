@@ -22,6 +22,8 @@ from airborne.motion.smoothing.run_fit import SmoothErrors
 from airborne.motion.uncertainty import propagate_variances, standard_deviation
 from airborne.types import Array
 
+_Gradients = list[tuple[NDArray[np.int64], Array]]  # of each joint the columns (c,) that turn it, and (n, 3, c)
+
 
 class ConstantOffsets(NamedTuple):
     """What stays the same, over some frames, of the errors that the surface gives: k of them, of an sd each."""
@@ -56,7 +58,8 @@ def constant_offsets(
     turned = of_surface[:, 6:]
     is_known = is_fitted & np.isfinite(np.diagonal(errors.covariances[kept], axis1=1, axis2=2)[:, 6:])
     n_turns_known, mean_rad = _mean(turned, is_known)
-    saved_rad2 = _variances(model, poses, turned) - _variances(model, poses, turned - mean_rad)
+    gradients = _gradients(model, poses)
+    saved_rad2 = _variances(gradients, turned) - _variances(gradients, turned - mean_rad)
     saved_rad2[~is_fitted[:, 0]] = 0
     return ConstantOffsets(rows[kept], n_known, mean_m, saved_m2, n_turns_known, mean_rad, saved_rad2)
 
@@ -75,21 +78,24 @@ def frame_deviations(motion: Motion, model: BodyModel, offsets: Sequence[Constan
     for each in offsets:
         is_saved = each.saved_m2 != 0
         of_landmarks[each.rows] -= np.where(is_saved, each.saved_m2 - _mean_square(each.mean_m - mean_m), 0.0)
-        poses = [motion.pose(row) for row in each.rows]
-        between = np.broadcast_to(each.mean_rad - mean_rad, (len(poses), *mean_rad.shape))
+        gradients = _gradients(model, [motion.pose(row) for row in each.rows])
+        between = np.broadcast_to(each.mean_rad - mean_rad, (len(each.rows), *mean_rad.shape))
         is_saved = each.saved_rad2 != 0
-        of_angles[each.rows] -= np.where(is_saved, each.saved_rad2 - _variances(model, poses, between), 0.0)
+        of_angles[each.rows] -= np.where(is_saved, each.saved_rad2 - _variances(gradients, between), 0.0)
     of_landmarks, of_angles = (standard_deviation(np.maximum(each, 0)) for each in (of_landmarks, of_angles))
     return FrameDeviations(of_landmarks, of_angles[:, 0], of_angles[:, 1])
 
 
-def _variances(model: BodyModel, poses: Sequence[Pose], turned: Array) -> Array:
-    """Return angles' variances by errors of an sd each (n, 3 joints, k): (n, 2, joints, 3), 0 without a sequence."""
+def _gradients(model: BodyModel, poses: Sequence[Pose]) -> tuple[_Gradients, _Gradients]:
+    """Return how joints' rotations change their x-y-z angles, and those in ISB's sequences."""
     angles = np.array([pose.joint_angles for pose in poses])
     own = [(3 * joint + np.arange(3), each) for joint, each in enumerate(angle_gradients(angles).swapaxes(0, 1))]
-    of_both = [
-        [gradient @ turned[:, columns] for columns, gradient in each] for each in (own, isb_gradients(model, angles))
-    ]
+    return own, isb_gradients(model, angles)
+
+
+def _variances(gradients: tuple[_Gradients, _Gradients], turned: Array) -> Array:
+    """Return angles' variances by errors of an sd each (n, 3 joints, k): (n, 2, joints, 3), 0 without a sequence."""
+    of_both = [[gradient @ turned[:, columns] for columns, gradient in each] for each in gradients]
     return np.nan_to_num(np.square(np.array(of_both)).sum(axis=-1)).transpose(2, 0, 1, 3)
 
 

@@ -16,7 +16,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.uncovered import find_uncovered
 
 _BESIDE_M2 = 6e-4  # uncovered beside a limb; on synthetic people such limbs hold half of the joints over 0.1 m off
-_FEWEST_VIEWS = 2  # in which something uncovered asks for a limb
+_FEWEST_VIEWS = 2  # in which something uncovered asks for a limb; chosen: one view shows what stands far behind, too
 
 
 @dataclass(frozen=True, slots=True, eq=False)

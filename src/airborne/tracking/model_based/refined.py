@@ -142,8 +142,14 @@ class RefinedTracker:
         if not state.past:  # nothing was known of colours before
             shares = self._mask_shares(estimate.pose, regions, appearance)
         reference = state.reference.update(*shares) if shares else state.reference
-        n_learned = state.n_learned + 1
-        return RefinedState(past, appearance, reference, estimate.covariance, n_learned, state.other_direction)
+        return replace(
+            state,
+            past=past,
+            appearance=appearance,
+            reference=reference,
+            covariance=estimate.covariance,
+            n_learned=state.n_learned + 1,
+        )
 
     def _mask_shares(self, pose: Pose, regions: Sequence[Region], known: Appearance) -> tuple[float, float] | None:
         """Return precision and recall of a pose's mask; None where no region's colours have been learned."""
