@@ -31,7 +31,7 @@ def describe_methods(summary: Mapping[str, Any]) -> str:
     if surface := SURFACES.get(summary.get("whole_run", "")):
         text.append(
             f"The poses of all frames were then fitted together to the images, by {surface}, with smooth accelerations "
-            "and, in flight, a centre of mass that falls freely."
+            "and, in flight, a centre of mass that falls freely and a constant angular momentum."
         )
     errors = [each["calibration_rms_px"] for each in cameras if each.get("calibration_rms_px") is not None]
     if errors:

@@ -8,14 +8,8 @@ import pytest
 from airborne.body.chain import delta_between, move_pose
 from airborne.body.human import human18
 from airborne.constants import FREE_FALL_M_S2
-from airborne.motion.smoothing.run_fit import (
-    Stretch,
-    acceleration_rows,
-    fall_offset_m,
-    fall_rows,
-    fit_run,
-    smooth_errors,
-)
+from airborne.motion.smoothing.conservation import fall_offset_m, fall_rows, momentum_rows
+from airborne.motion.smoothing.run_fit import Stretch, acceleration_rows, fit_run, smooth_errors
 from airborne.synthetic.flight.articulated import Takeoff, fly_articulated, joint_motion
 from airborne.tracking.model_based.image_evidence import ImageEvidence
 
@@ -69,7 +63,7 @@ def off_m(poses, rows=slice(None)):
     return float(np.linalg.norm(errors, axis=-1).mean())
 
 
-@pytest.mark.parametrize("rows", ["acceleration", "fall"])
+@pytest.mark.parametrize("rows", ["acceleration", "fall", "momentum"])
 def test_rows_follow_their_derivatives(rows):
     time_s = np.array([0.0, 0.02, 0.05])  # a frame was left out
     poses = fly(time_s)
@@ -77,6 +71,8 @@ def test_rows_follow_their_derivatives(rows):
     def at(poses):
         if rows == "fall":
             return fall_rows(HUMAN, poses, time_s, OFFSET_M)
+        if rows == "momentum":
+            return momentum_rows(HUMAN, poses, time_s)
         return acceleration_rows(HUMAN, poses, time_s, FREE_FALL_M_S2)
 
     here, step, rng = at(poses), 1e-6, np.random.default_rng(2)
@@ -85,8 +81,8 @@ def test_rows_follow_their_derivatives(rows):
         values = [at([*poses[:k], move_pose(poses[k], sign * step * x), *poses[k + 1 :]]).values for sign in (1, -1)]
         numeric = ((values[0] - values[1]) / (2 * step))[0]
         analytic = np.einsum("gkw,gw->gk", here.by_change[0, :, :, k], x.reshape(len(numeric), -1))
-        # accelerations leave out how a turn between two frames bends a change
-        share = 0.15 if rows == "acceleration" else 1e-5
+        # accelerations leave out how a turn between two frames bends a change, momenta how it moves their sd
+        share = {"acceleration": 0.15, "momentum": 1e-4, "fall": 1e-5}[rows]
         np.testing.assert_allclose(analytic, numeric, atol=share * abs(numeric).max())
 
 
@@ -103,6 +99,12 @@ def test_a_true_flight_falls_freely_and_with_masses_elsewhere_in_the_root_too_bu
     assert largest_fall_error(HUMAN, TRUTH) < 0.2
     assert largest_fall_error(elsewhere, TRUTH) < 0.5 < abs(fall_rows(elsewhere, TRUTH, TIME_S, REST).values).max()
     assert largest_fall_error(HUMAN, shaken) > 2
+
+
+def test_nothing_turns_a_true_flight_but_one_whose_trunk_is_turned():
+    turned = [pose.move(REST, 0.02 * np.sin([0.0, 20 * t, 0.0])) for pose, t in zip(TRUTH, TIME_S, strict=True)]
+    assert abs(momentum_rows(HUMAN, TRUTH, TIME_S).values).max() < 0.2
+    assert abs(momentum_rows(HUMAN, turned, TIME_S).values).max() > 1
 
 
 def test_steady_motion_has_no_acceleration_but_gravity():

@@ -1,7 +1,7 @@
 """The most probable motion: a whole run fitted at once to its images and to how bodies move.
 
 The poses of all frames are unknown together. Each frame's images are evidence about its own pose; between frames the
-accelerations of the root and of every joint are white noise, and in flight the centre of mass falls freely. Each
+accelerations of the root and of every joint are white noise, and in flight mass falls and momentum is constant. Each
 Gauss-Newton step linearises both anew, about all poses of the run, and solves one banded system. So a frame is fitted
 with what the images before and after it show, and no image counts twice, as it does through a tracker's predictions.
 Batch estimation: Barfoot 2017, "State Estimation for Robotics", sections 3.1 and 4.3; white accelerations: Bar-Shalom,
@@ -23,8 +23,7 @@ from airborne.body.chain import delta_between, move_pose
 from airborne.constants import FREE_FALL_M_S2
 from airborne.geometry.banded_equations import BandedEquations, JoiningRows
 from airborne.geometry.descent import BacktrackingRule, descend
-from airborne.motion.flight.fall import fit_fall
-from airborne.motion.flight.momentum import centre_of_mass
+from airborne.motion.smoothing.conservation import fall_offset_m, fall_rows, momentum_rows
 from airborne.motion.smoothing.free_rotation import TRUNK
 from airborne.tracking.model_based.image_evidence import ImageEvidence
 from airborne.types import Array
@@ -40,9 +39,6 @@ _DENSITY = 120.0**2 / 50
 _SLOW_DENSITY = 30.0**2 / 50
 _SLOW = ("head", "hand_left", "hand_right", "foot_left", "foot_right")
 _TRUNK_DENSITY = 10.0**2 / 50  # of the trunk's joints: with 30 rad/s2 joints err by 0.7 % more; with 5 the largest do
-# [m2/s3] of the centre of mass's in flight, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2 the least errors
-# of the same, four of them tracked with bodies of other lengths and girths
-_FALL_DENSITY = 0.3**2 / 50
 _DAMPING = 1e-4  # [1/m2, 1/rad2] holds what neither images nor neighbours show
 N_STEPS = 4  # on seven synthetic somersaults errors fall up to the fourth; further steps fit what images have wrong
 _SHORTER, _LEAST_SHARE = 0.4, 0.1  # factor on a step that does not lower the cost, and the least share of one
@@ -129,7 +125,8 @@ def _joining_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, stretc
     rows = acceleration_rows(model, poses, time_s, FREE_FALL_M_S2 if stretch.falls else np.zeros(3))
     if not stretch.falls:
         return [rows]
-    return [rows, fall_rows(model, poses, time_s, fall_offset_m(model, poses, time_s))]
+    fall = fall_rows(model, poses, time_s, fall_offset_m(model, poses, time_s))
+    return [rows, fall, momentum_rows(model, poses, time_s)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,30 +196,3 @@ def acceleration_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, gr
     density = np.where(is_trunk, _TRUNK_DENSITY, np.where(is_slow, _SLOW_DENSITY, _DENSITY))
     sd = np.sqrt(density / between_s)
     return JoiningRows(rows / sd[..., None, None, None], values / sd[..., None])
-
-
-def fall_offset_m(model: BodyModel, poses: Sequence[Pose], time_s: Array) -> Array:
-    """Return by what the centre of mass lies beside the body's, in the root's frame, to fall as it does: (3,) [m].
-
-    The body's masses are not quite the person's; see `fit_fall`.
-    """
-    place = np.array([centre_of_mass(model.with_pose(pose))[0] for pose in poses])
-    return fit_fall(time_s, place, np.array([pose.world_from_root.rotation.as_matrix() for pose in poses])).offset_m
-
-
-def fall_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array, offset_m: Array) -> JoiningRows:
-    """Return how far the acceleration of the centre of mass is from gravity: in sds, three of each three frames.
-
-    It lies by an offset (3,) in the root's frame beside that of the body.
-    """
-    centres = [centre_of_mass(model.with_pose(pose)) for pose in poses]
-    offsets = np.array([pose.world_from_root.rotation.apply(offset_m) for pose in poses])
-    place, slope = np.array([each[0] for each in centres]) + offsets, np.array([each[1] for each in centres])
-    slope[:, :, 3:6] -= np.cross(offsets[:, None], np.eye(3)).swapaxes(1, 2)  # w x offset
-    before_s, after_s = np.diff(time_s)[:-1], np.diff(time_s)[1:]
-    between_s, n = (before_s + after_s) / 2, len(before_s)
-    weights = np.stack([1 / before_s, -1 / before_s - 1 / after_s, 1 / after_s], axis=1) / between_s[:, None]
-    values = sum(weights[:, j, None] * place[j : n + j] for j in range(3)) - FREE_FALL_M_S2
-    rows = np.stack([weights[:, j, None, None] * slope[j : n + j] for j in range(3)], axis=2)
-    sd = np.sqrt(_FALL_DENSITY / between_s)[:, None, None]
-    return JoiningRows(rows[:, None] / sd[..., None, None], values[:, None] / sd)
