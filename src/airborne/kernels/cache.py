@@ -22,6 +22,7 @@ from numba import config
 from numba.core.caching import UserProvidedCacheLocator, _Cache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
@@ -50,7 +51,7 @@ class KernelCache(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Load the code for these types of arguments; none where there is none, or it cannot be read."""
-        target_context.refresh()
+        rtsys.initialize(target_context)  # all that code from a file needs; to compile, Numba imports far more
         path = self._path(sig, target_context.codegen())
         if path is None:
             return None
