@@ -20,7 +20,7 @@ from airborne.body import (
     human18,
     surface_arrays,
 )
-from airborne.body.files import body_toml, mesh_files, read_body, write_body
+from airborne.body.files import body_toml, find_mesh_files, read_body, write_body
 from airborne.body.limits import JointLimits
 from airborne.errors import BodyError
 from tests.support.tolerances import EXACT
@@ -365,7 +365,7 @@ def test_any_body_is_read_back_as_it_was_written(tmp_path, seed):
     model = random_body(seed)
     write_body(tmp_path / "body.toml", model)
     same(read_body(tmp_path / "body.toml"), model)
-    (mesh,) = mesh_files(tmp_path / "body.toml")
+    (mesh,) = find_mesh_files(tmp_path / "body.toml")
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["body.toml", mesh])
 
 
@@ -389,5 +389,5 @@ def test_plain_turns_are_written_in_plain_degrees_and_nothing_needless(tmp_path)
 def test_the_meshes_of_a_damaged_file_are_refused_in_one_line(tmp_path, text):
     (tmp_path / "body.toml").write_text(text)
     with pytest.raises(BodyError, match=r"^body\.toml") as error:
-        mesh_files(tmp_path / "body.toml")
+        find_mesh_files(tmp_path / "body.toml")
     assert "\n" not in str(error.value)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import BodyModel, Pose
-from airborne.body.sides import are_crossed, other_side, paired_legs, paired_limbs
+from airborne.body.sides import are_crossed, leg_pairs, limb_pairs, other_side
 from airborne.motion import landmarks
 from airborne.motion.joints import joint_statuses
 from tests.support.motions import motion_of
@@ -45,7 +45,7 @@ def test_many_frames_are_told_as_each_of_them_is():
 
 def test_a_body_without_legs_has_none_to_cross():
     trunk = BodyModel("trunk", HUMAN.segments[:3])
-    assert not paired_legs(trunk)
+    assert not leg_pairs(trunk)
     assert not are_crossed(trunk, np.zeros((4, 3, 3))).any()
 
 
@@ -71,7 +71,7 @@ def test_the_other_side_of_the_other_side_is_the_name_itself():
 
 
 def test_pairs_of_limbs_are_of_both_sides_from_the_trunk_on():
-    for limb in paired_limbs(HUMAN):
+    for limb in limb_pairs(HUMAN):
         assert HUMAN.parents[limb[0][0]] == HUMAN.parents[limb[0][1]]
         for left, right in limb:
             assert other_side(HUMAN.segments[left].name) == HUMAN.segments[right].name

@@ -8,7 +8,7 @@ import pytest
 
 import airborne
 from airborne import cli
-from airborne.calibration.acceptance import Errors, write_accepted
+from airborne.calibration.acceptance import CalibrationErrors, write_accepted
 from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError, CalibrationError
 from tests.support.cameras import three_cameras
@@ -20,7 +20,7 @@ GOOD = {name: np.full(20, 0.7) for name in RIG.names}
 
 
 def test_a_good_calibration_is_written_under_its_name(tmp_path):
-    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, GOOD))
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, CalibrationErrors(ERRORS, GOOD))
     assert (written, reasons) == (tmp_path / "calib.toml", ())
     assert [path.name for path in tmp_path.iterdir()] == ["calib.toml"]
     assert read_rig(written).names == RIG.names
@@ -29,7 +29,7 @@ def test_a_good_calibration_is_written_under_its_name(tmp_path):
 def test_an_absurd_left_out_error_is_named_and_the_old_file_stays(tmp_path):
     (tmp_path / "calib.toml").write_text("an older one")
     absurd = GOOD | {RIG.names[1]: np.r_[np.full(14, 0.5), np.full(6, 300.0)]}
-    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, absurd))
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, CalibrationErrors(ERRORS, absurd))
     assert written == tmp_path / "calib.rejected.toml" and written.exists()
     assert (tmp_path / "calib.toml").read_text() == "an older one"
     assert len(reasons) == 1 and reasons[0].startswith(f"{RIG.names[1]}: what is left out of the fit lies 164 px")
@@ -39,17 +39,17 @@ def test_a_few_wrong_clicks_and_errors_that_are_unknown_are_no_reason(tmp_path):
     some = np.r_[np.full(17, 0.5), np.full(3, 300.0)]
     unknown = np.full(20, np.nan)
     held_out_px = dict(zip(RIG.names, (some, unknown, some), strict=True))
-    assert write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, held_out_px))[1] == ()
+    assert write_accepted(tmp_path / "calib.toml", RIG, CalibrationErrors(ERRORS, held_out_px))[1] == ()
 
 
 def test_one_point_that_spoils_a_fit_of_least_squares_is_a_reason(tmp_path):
     residual_px = {name: np.full((20, 2), 0.5) for name in RIG.names}
     residual_px[RIG.names[0]][3] = (90.0, 0.0)
     residual_px[RIG.names[1]][4] = np.nan
-    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, GOOD, residual_px))
+    written, reasons = write_accepted(tmp_path / "calib.toml", RIG, CalibrationErrors(ERRORS, GOOD, residual_px))
     assert written.name == "calib.rejected.toml"
     assert len(reasons) == 1 and reasons[0].startswith(f"{RIG.names[0]}: a control point lies 90 px from where")
-    missed = Errors(ERRORS, GOOD, residual_px, [f"P{k}" for k in range(20)])
+    missed = CalibrationErrors(ERRORS, GOOD, residual_px, [f"P{k}" for k in range(20)])
     assert "that miss most (P3 by 90 px, P" in write_accepted(tmp_path / "calib.toml", RIG, missed)[1][0]
 
 
@@ -141,7 +141,7 @@ def test_two_points_mixed_up_are_named_by_the_python_interface(thrown_cross, tmp
 def test_what_our_reader_refuses_is_rejected(tmp_path):
     far = Rig(tuple(replace(c, camera_from_world=c.camera_from_world) for c in RIG))
     scaled = Rig(tuple(_far(camera, 1000.0) for camera in far))
-    written, reasons = write_accepted(tmp_path / "calib.toml", scaled, Errors(ERRORS, GOOD))
+    written, reasons = write_accepted(tmp_path / "calib.toml", scaled, CalibrationErrors(ERRORS, GOOD))
     assert written.name == "calib.rejected.toml"
     assert "m apart at most: give lengths in metres" in reasons[0]
 
@@ -182,5 +182,5 @@ def test_a_path_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path, mo
 
     monkeypatch.setattr("airborne.calibration.acceptance.write_pose2sim", refuse)
     with pytest.raises(PermissionError) as caught:
-        write_accepted(tmp_path / "calib.toml", RIG, Errors(ERRORS, GOOD))
+        write_accepted(tmp_path / "calib.toml", RIG, CalibrationErrors(ERRORS, GOOD))
     assert caught.value.filename == str(tmp_path / "calib.toml")

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 from pyarrow import csv
 
-from airborne.export.tables import body_columns, players_columns, write_csv, write_parquet
+from airborne.export.tables import body_columns, players_columns, write_csv, write_wide_parquet
 from airborne.motion import joint_angles, joint_statuses, landmarks, measure_flight
 from tests.support.export_scenes import BOX, PERSON
 from tests.support.takes import jumping, tumbling
@@ -61,7 +61,7 @@ def test_players_have_a_row_each_at_every_frame():
 
 def test_csv_and_parquet_read_back_to_the_last_bit(columns, tmp_path):
     write_csv(tmp_path / "run.csv", columns)
-    write_parquet(tmp_path / "run.parquet", columns)
+    write_wide_parquet(tmp_path / "run.parquet", columns)
     text, typed = csv.read_csv(tmp_path / "run.csv"), pq.read_table(tmp_path / "run.parquet")
     assert text.column_names == typed.column_names == list(columns)
     for name, column in columns.items():
@@ -76,7 +76,7 @@ def test_the_unknown_is_empty_and_the_unobservable_infinite(columns, tmp_path):
     unseen = np.where(np.arange(6) == 3, np.inf, columns["head_m_sd"].values)
     columns = {**columns, "head_m_sd": columns["head_m_sd"]._replace(values=unseen)}
     write_csv(tmp_path / "run.csv", columns)
-    write_parquet(tmp_path / "run.parquet", columns)
+    write_wide_parquet(tmp_path / "run.parquet", columns)
     lines = [line.split(",") for line in (tmp_path / "run.csv").read_text().splitlines()]
     assert set(lines[3][3:]) == {"", "lost"}
     assert lines[4][list(columns).index("head_m_sd")] == "inf"
@@ -86,7 +86,7 @@ def test_the_unknown_is_empty_and_the_unobservable_infinite(columns, tmp_path):
 
 
 def test_units_stand_in_the_metadata(columns, tmp_path):
-    write_parquet(tmp_path / "run.parquet", columns)
+    write_wide_parquet(tmp_path / "run.parquet", columns)
     schema = pq.read_schema(tmp_path / "run.parquet")
     units = {field.name: field.metadata[b"units"] for field in schema}
     assert units["time_s"] == b"s"

@@ -16,7 +16,7 @@ from airborne.geometry.rotations import geodesic
 from airborne.reproduction import (
     CASES,
     RIGID_METHODS,
-    Errors,
+    RunErrors,
     half_width,
     make_experiment,
     score_curves,
@@ -71,11 +71,11 @@ def test_flat_colours_need_one_for_every_segment(exact):
 
 def test_errors_are_signed_in_the_papers_order_and_leave_the_lost_out():
     values = np.array([[3.0, 0, 0, 0, 0, 0], [-4.0, 1, 2, 0.3, 0.4, 0.5], [np.nan] * 6, [0, 900.0, 0, 0, 0, 0]])
-    errors = Errors(values[:3])
+    errors = RunErrors(values[:3])
     np.testing.assert_allclose(errors.rms, [np.sqrt(12.5), *np.array([1, 2, 0.3, 0.4, 0.5]) / np.sqrt(2)], atol=EXACT)
     np.testing.assert_array_equal(errors.largest, [4, 1, 2, 0.3, 0.4, 0.5])
-    assert (errors.n_lost, Errors(values).n_lost) == (1, 2)
-    assert np.isnan(Errors(values[2:3]).rms).all()
+    assert (errors.n_lost, RunErrors(values).n_lost) == (1, 2)
+    assert np.isnan(RunErrors(values[2:3]).rms).all()
 
 
 def test_refined_finds_the_ellipsoids_it_was_rendered_with(exact):

@@ -10,7 +10,7 @@ import pytest
 from airborne.body.shaping import with_size
 from airborne.cameras import Rig
 from airborne.run import untracked
-from airborne.run.mix_ups import MixUp, _silhouette, possible_mix_ups, undecided_mix_ups
+from airborne.run.mix_ups import MixUp, _silhouette, find_undecided_mix_ups, possible_mix_ups
 from airborne.run.untracked import explain_untracked
 from airborne.tracking.methods import Settings
 from airborne.video import VideoFacts
@@ -109,22 +109,22 @@ def test_cameras_of_which_either_may_be_left_out_are_named_together():
 
 def test_mix_ups_that_what_stands_out_speaks_against_are_not_tried():
     seen = [_silhouette(CROSS, SCENE.start(), camera) for camera in RIG]
-    assert undecided_mix_ups(RIG, seen, CROSS, SCENE.start()) == []
-    unseen = undecided_mix_ups(RIG, [None] * 3, CROSS, SCENE.start())
+    assert find_undecided_mix_ups(RIG, seen, CROSS, SCENE.start()) == []
+    unseen = find_undecided_mix_ups(RIG, [None] * 3, CROSS, SCENE.start())
     assert unseen == [mix_up for mix_up in possible_mix_ups(3) if not mix_up.is_turned]
     upside_down = [seen[0], seen[1][::-1, ::-1], seen[2]]
-    assert MixUp((1,), is_turned=True) in undecided_mix_ups(RIG, upside_down, CROSS, SCENE.start())
+    assert MixUp((1,), is_turned=True) in find_undecided_mix_ups(RIG, upside_down, CROSS, SCENE.start())
     exchanged = [seen[1], seen[0], seen[2]]
-    assert MixUp((0, 1)) in undecided_mix_ups(RIG, exchanged, CROSS, SCENE.start())
+    assert MixUp((0, 1)) in find_undecided_mix_ups(RIG, exchanged, CROSS, SCENE.start())
 
 
 def test_an_exchange_is_tried_where_each_image_agrees_with_both_silhouettes():
     seen = [_silhouette(CROSS, SCENE.start(), camera) for camera in RIG]
     is_in = np.indices(seen[0].shape).sum(axis=0) % 4 > 0  # three of four pixels
     alike = [seen[0] & is_in | seen[1], seen[1] & is_in | seen[0], seen[2]]
-    assert undecided_mix_ups(RIG, alike, CROSS, SCENE.start()) == [MixUp((0, 1))]
+    assert find_undecided_mix_ups(RIG, alike, CROSS, SCENE.start()) == [MixUp((0, 1))]
     right = [seen[0] | seen[1] & is_in, seen[1] | seen[0] & is_in, seen[2]]
-    assert undecided_mix_ups(RIG, right, CROSS, SCENE.start()) == []
+    assert find_undecided_mix_ups(RIG, right, CROSS, SCENE.start()) == []
 
 
 def test_what_is_undone_twice_is_as_before():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.motion import Motion
-from airborne.run.wrong_colours import wrong_colours
+from airborne.run.wrong_colours import find_wrong_colours
 from airborne.tracking import Estimate, Status
 from tests.support.people import HUMAN, person
 from tests.support.scenes import CROSS, Scene
@@ -29,20 +29,20 @@ def run_of(status=Status.TRACKED):
 
 @pytest.mark.parametrize("brightness", [0.8, 1.0])
 def test_a_persons_own_colours_are_taken_without_a_word(brightness):
-    assert wrong_colours(HUMAN.with_colours(brightness * COLOURS), run_of(), FRAMES) == []
+    assert find_wrong_colours(HUMAN.with_colours(brightness * COLOURS), run_of(), FRAMES) == []
 
 
 @pytest.mark.parametrize("colours", [255 - COLOURS, COLOURS[::-1]])
 def test_other_colours_are_named_where_frames_are_tracked(colours):
     other = HUMAN.with_colours(colours)
-    (sentence,) = wrong_colours(other, run_of(), FRAMES)
+    (sentence,) = find_wrong_colours(other, run_of(), FRAMES)
     assert sentence.startswith("the body's colours lie") and "airborne fit-body" in sentence
-    assert wrong_colours(other, run_of(Status.UNCERTAIN), FRAMES) == wrong_colours(other, run_of(), []) == []
+    assert find_wrong_colours(other, run_of(Status.UNCERTAIN), FRAMES) == find_wrong_colours(other, run_of(), []) == []
 
 
 def test_colours_that_are_not_known_yet_say_nothing():
     first = replace(HUMAN.segments[0], parts=tuple(replace(part, colour=None) for part in HUMAN.segments[0].parts))
-    assert wrong_colours(replace(HUMAN, segments=(first, *HUMAN.segments[1:])), run_of(), FRAMES) == []
+    assert find_wrong_colours(replace(HUMAN, segments=(first, *HUMAN.segments[1:])), run_of(), FRAMES) == []
 
 
 def test_a_thing_with_the_colours_of_another_is_named():
@@ -51,6 +51,6 @@ def test_a_thing_with_the_colours_of_another_is_named():
     posed = {"status": Status.TRACKED, "covariance": np.eye(6) * 1e-5, "score": 5.0, "n_views": 4}
     seen = [Estimate(index=f.index, time_s=f.time_s, pose=scene.start(f.index), **posed) for f in frames]
     own = np.array([part.colour for part in CROSS.parts])
-    assert wrong_colours(CROSS, Motion.collect(seen), frames) == []
-    (sentence,) = wrong_colours(CROSS.with_colours(own[:, ::-1]), Motion.collect(seen), frames)
+    assert find_wrong_colours(CROSS, Motion.collect(seen), frames) == []
+    (sentence,) = find_wrong_colours(CROSS.with_colours(own[:, ::-1]), Motion.collect(seen), frames)
     assert "red and blue exchanged" in sentence and "fit-body" not in sentence

@@ -30,7 +30,7 @@ from airborne.studio.calibrating import (
     read_report,
     sources_text,
     wand_text,
-    write_report,
+    write_calibration_report,
 )
 from airborne.studio.clicks import read_clicked
 from airborne.studio.pages.cameras import _describe
@@ -150,12 +150,12 @@ def test_what_a_calibration_said_is_kept_in_the_folder_only(tmp_path):
     for each in (folder / REPORT, other):
         each.mkdir(parents=True)
     assert read_report(folder) == ""
-    write_report(folder, "camera seen\n")
+    write_calibration_report(folder, "camera seen\n")
     assert read_report(folder) == "camera seen\n"
     (folder / REPORT / "report.txt").unlink()
     (folder / REPORT).rmdir()
     (folder / REPORT).symlink_to(other)
     (other / "residuals_a.png").write_bytes(b"png")
     with pytest.raises(TrialError, match="leads out of the folder"):
-        write_report(folder, "")
+        write_calibration_report(folder, "")
     assert list_pictures(folder) == []

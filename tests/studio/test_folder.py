@@ -30,7 +30,7 @@ from airborne.studio.project import (
     read_project,
 )
 from airborne.studio.session import Session
-from airborne.studio.starts import read_players, read_points
+from airborne.studio.starts import read_clicked_players, read_points
 from airborne.trial.file import Trial
 from tests.support.places import THROWN_CROSS
 
@@ -57,7 +57,7 @@ LISTS = {
     "runs": list_runs,
     "a run by its name": lambda folder: [run for run in [find_run(folder, "results")] if run],
     "pictures of a calibration": list_pictures,
-    "players": lambda folder: list(read_players(folder, 3)),
+    "players": lambda folder: list(read_clicked_players(folder, 3)),
     "landmarks": lambda folder: list(read_points(Session(folder, folder / "trial.toml"), 3).names),
 }
 

@@ -190,7 +190,7 @@ def _shape(table: _PartTable, path: Path) -> Shape:
     return read_mesh(path.parent / value, table.scale)
 
 
-def mesh_files(path: Path) -> list[str]:
+def find_mesh_files(path: Path) -> list[str]:
     """Return the mesh files that a body file names, relative to it; raises BodyError for a file that cannot be read."""
     return [part.file for segment in _read_table(path).segment for part in segment.part if part.file is not None]
 

@@ -28,7 +28,7 @@ def without_side(name: str) -> str:
     return "_".join(word for word in name.split("_") if word not in _OTHER)
 
 
-def paired_limbs(model: BodyModel) -> list[list[tuple[int, int]]]:
+def limb_pairs(model: BodyModel) -> list[list[tuple[int, int]]]:
     """Return for every pair of limbs the indices of its segments, left and right, from the trunk on.
 
     A pair is what hangs on the trunk by segments named `<name>_left` and `<name>_right`.
@@ -46,9 +46,9 @@ def paired_limbs(model: BodyModel) -> list[list[tuple[int, int]]]:
 
 
 @lru_cache(maxsize=8)
-def paired_legs(model: BodyModel) -> tuple[NDArray[np.int64], ...]:
+def leg_pairs(model: BodyModel) -> tuple[NDArray[np.int64], ...]:
     """Return the segments of each pair of limbs on the root, of two segments or more: (2, segments), left and right."""
-    on_root = [limb for limb in paired_limbs(model) if model.parents[limb[0][0]] == 0]
+    on_root = [limb for limb in limb_pairs(model) if model.parents[limb[0][0]] == 0]
     return tuple(np.array(limb).T for limb in on_root if len(limb) > 1)
 
 
@@ -58,7 +58,7 @@ def are_crossed(model: BodyModel, joints_m: Array) -> NDArray[np.bool_]:
     Their knees lie far aslant of the hips, or their ankles on each other's side. Few people are ever seen so.
     """
     crossed = np.zeros(joints_m.shape[:-2], np.bool_)
-    for left, right in paired_legs(model):
+    for left, right in leg_pairs(model):
         across = joints_m[..., left[:3], :] - joints_m[..., right[:3], :]
         length = np.linalg.norm(across, axis=-1)
         along = np.sum(across[..., :1, :] * across, axis=-1)

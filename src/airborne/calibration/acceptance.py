@@ -22,7 +22,7 @@ _N_NAMED = 3  # outliers in a message
 _FEWEST = 8  # left-out errors of a camera that can be judged
 
 
-class Errors(NamedTuple):
+class CalibrationErrors(NamedTuple):
     """What a calibration misses, by camera."""
 
     rms_px: Mapping[str, float]
@@ -31,7 +31,7 @@ class Errors(NamedTuple):
     points: Sequence[str] = ()  # (n,) their names
 
     @classmethod
-    def of(cls, calibration: Calibration | RigCalibration, points: Sequence[str] = ()) -> Errors:
+    def of(cls, calibration: Calibration | RigCalibration, points: Sequence[str] = ()) -> CalibrationErrors:
         """Return those of a calibration from control points of these names, or from sources."""
         if isinstance(calibration, Calibration):
             return cls(
@@ -47,7 +47,7 @@ class Errors(NamedTuple):
         )
 
 
-def write_accepted(path: Path, rig: Rig, missed: Errors) -> tuple[Path, tuple[str, ...]]:
+def write_accepted(path: Path, rig: Rig, missed: CalibrationErrors) -> tuple[Path, tuple[str, ...]]:
     """Write a rig as Pose2Sim TOML; return where, and why it was rejected: then it has another name, beside."""
     rejected = path.with_name(f"{path.stem}.rejected{path.suffix}")
     reasons = list(_reasons(rig, missed))
@@ -71,16 +71,16 @@ def require_plausible(calibration: Calibration | RigCalibration) -> None:
     """Raise CalibrationError, naming points, for a calibration that `write_accepted` would reject for its errors."""
     found = calibration.findings if isinstance(calibration, Calibration) else ()
     outliers = [finding.what for finding in found if finding.kind == "outlier"]
-    for reason in _reasons(calibration.rig, Errors.of(calibration)):
+    for reason in _reasons(calibration.rig, CalibrationErrors.of(calibration)):
         raise CalibrationError("; ".join([reason, *outliers[:_N_NAMED]]))
 
 
-def _reasons(rig: Rig, missed: Errors) -> Iterator[str]:
+def _reasons(rig: Rig, missed: CalibrationErrors) -> Iterator[str]:
     yield from _absurd_errors(rig, missed.held_out_px)
-    yield from _spoiled_fits(rig, missed)
+    yield from _find_spoiled_fits(rig, missed)
 
 
-def _spoiled_fits(rig: Rig, missed: Errors) -> Iterator[str]:
+def _find_spoiled_fits(rig: Rig, missed: CalibrationErrors) -> Iterator[str]:
     """Yield a sentence for every camera one of whose points lies absurdly far from where the fit expects it."""
     for name, residual in missed.residual_px.items():
         distance, limit = np.nan_to_num(np.linalg.norm(residual, axis=1)), _ABSURD_SHARE * max(rig[name].size)

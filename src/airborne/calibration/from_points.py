@@ -110,7 +110,10 @@ def calibrate(
     }
     solutions = {name: choose_simplest(each) for name, each in candidates.items()}
     common_sd_m = common_lens_sd(candidates, sizes)
-    fits = [_describe_fit(points, name, solutions[name], candidates[name], common_sd_m.get(name)) for name in solutions]
+    fits = [
+        _describe_fit(points, name, solutions[name], candidates[name], common_lens_sd_m=common_sd_m.get(name))
+        for name in solutions
+    ]
     cameras = [
         replace(
             each.pinhole.camera(fit.name, sizes[fit.name], each.shift_sd_px),
@@ -124,7 +127,7 @@ def calibrate(
         method=method,
         fits=tuple(fits),
         held_out_points_m=_point_errors_left_out(points, solutions),
-        findings=check_solutions(points, sizes, decompositions, candidates, solutions),
+        findings=check_solutions(points, sizes, decompositions, candidates, solutions=solutions),
     )
 
 
@@ -152,7 +155,7 @@ def _solve(
 
 
 def _describe_fit(
-    points: ControlPoints, name: str, best: Solution, candidates: list[Solution], common_lens_sd_m: Array | None
+    points: ControlPoints, name: str, best: Solution, candidates: list[Solution], *, common_lens_sd_m: Array | None
 ) -> CameraFit:
     is_seen = points.is_seen_by(name)
     P_dlt = fit_dlt(best.world, best.px)

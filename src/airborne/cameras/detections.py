@@ -97,7 +97,7 @@ def read_detections(
             if n_people > 1:
                 which = "the one detected most surely" if person is None else f"number {person} of each"
                 notes.append(f"{camera}: up to {n_people} people in an image; took {which}")
-        return _detections(str(path), tables, said, skeleton, tuple(notes))
+        return _detections(str(path), tables, said, skeleton, notes=tuple(notes))
     try:
         arrays = read_arrays(path)
     except OSError as error:
@@ -169,7 +169,7 @@ def _match_cameras(where: str, cameras: Sequence[str], keys: Sequence[str], name
 
 
 def _detections(
-    where: str, tables: Mapping[str, Array], said: set[str], skeleton: str | None, notes: tuple[str, ...] = ()
+    where: str, tables: Mapping[str, Array], said: set[str], skeleton: str | None, *, notes: tuple[str, ...] = ()
 ) -> Detections:
     """Stack the cameras' tables (frames, points, 3); shorter ones are padded with NaN."""
     if not tables:

@@ -106,14 +106,14 @@ def _from_control_points(
 ) -> None:
     from airborne.calibration import calibrate as calibrate_cameras
     from airborne.calibration import read_control_points
-    from airborne.calibration.acceptance import Errors, write_accepted
+    from airborne.calibration.acceptance import CalibrationErrors, write_accepted
     from airborne.calibration.points_report import describe_points_calibration, points_calibration_to_dict
 
     if size is None:
         raise AirborneError("--size is missing: give the image size in pixels, such as 768x576")
     table = read_control_points(points)
     calibration = calibrate_cameras(table, _sizes(size, table.cameras), method=method)
-    written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration, table.names))
+    written, reasons = write_accepted(output, calibration.rig, CalibrationErrors.of(calibration, table.names))
     report = (
         json.dumps(points_calibration_to_dict(calibration)) if as_json else describe_points_calibration(calibration)
     )
@@ -212,14 +212,14 @@ def _metres(text: str) -> float:
 
 def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> None:
     from airborne.calibration import calibrate_from
-    from airborne.calibration.acceptance import Errors, write_accepted
+    from airborne.calibration.acceptance import CalibrationErrors, write_accepted
     from airborne.calibration.report import calibration_to_dict, describe_calibration
     from airborne.calibration.residual_figures import write_residual_figures
 
     with Stages() as stages:
         calibration = calibrate_from(sources, stages)
     report = calibration_to_dict(calibration)
-    written, reasons = write_accepted(output, calibration.rig, Errors.of(calibration))
+    written, reasons = write_accepted(output, calibration.rig, CalibrationErrors.of(calibration))
     pictures = write_residual_figures(folder, calibration)
     write_text(folder / "report.json", json.dumps(report, indent=1))
     beside = f"report: {folder / 'report.json'} and {count(len(pictures), 'image')} beside it"

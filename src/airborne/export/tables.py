@@ -78,7 +78,7 @@ def write_csv(path: Path, columns: Columns) -> None:
         csv.writer(file, lineterminator="\n").writerows([list(columns), *rows])
 
 
-def write_parquet(path: Path, columns: Columns) -> None:
+def write_wide_parquet(path: Path, columns: Columns) -> None:
     """Write columns as Parquet, units in the metadata; NaN is null. Needs *pyarrow*."""
     values = {name: column.values for name, column in columns.items()}
     units = {name: column.unit for name, column in columns.items()}

@@ -25,11 +25,11 @@ from airborne.errors import AirborneError, RunThereError, require_choice
 from airborne.interface.arguments import (
     FilePath,
     as_list,
-    check_times,
     explain_paths,
     folder_of,
     report_progress,
     report_stages,
+    to_times,
 )
 from airborne.io.names import to_path
 from airborne.motion.smoothing.smoother import Smoothing
@@ -232,7 +232,7 @@ def smooth(
     if not isinstance(cutoff_hz, float | int | None):
         raise AirborneError(f"cutoff_hz is {cutoff_hz!r}; expected Hz, or None for that of the residual analysis")
     settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
-    out, times_s = None if output is None else to_path(output), check_times(events_s)
+    out, times_s = None if output is None else to_path(output), to_times(events_s)
     with report_progress(progress, "smoothing") as report:
         return smooth_run(folder_of(run), settings, events_s=times_s, out=out, progress=report)
 

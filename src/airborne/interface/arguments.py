@@ -26,13 +26,13 @@ def explain_paths(function: Callable[_Given, _Found]) -> Callable[_Given, _Found
     """Let a function raise an AirborneError, in one line, for a path that cannot be read or written."""
 
     @wraps(function)
-    def explained(*args: _Given.args, **kwargs: _Given.kwargs) -> _Found:
+    def call(*args: _Given.args, **kwargs: _Given.kwargs) -> _Found:
         try:
             return function(*args, **kwargs)
         except OSError as error:
             raise AirborneError(describe_path_error(error)) from error
 
-    return explained
+    return call
 
 
 def as_list(given: FilePath | Run | Sequence[FilePath | Run]) -> Sequence[FilePath | Run]:
@@ -40,7 +40,7 @@ def as_list(given: FilePath | Run | Sequence[FilePath | Run]) -> Sequence[FilePa
     return [given] if isinstance(given, str | PathLike | Run) else given
 
 
-def check_times(events_s: Sequence[float] | None) -> list[float] | None:
+def to_times(events_s: Sequence[float] | None) -> list[float] | None:
     """Return times [s], or None for None; raises AirborneError for anything else."""
     try:
         if not isinstance(events_s, str):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel, PosedBody
 from airborne.body.chain import nearest_angles, point_jacobian
 from airborne.body.shaping import half_widths_m
-from airborne.body.sides import are_crossed, paired_legs
+from airborne.body.sides import are_crossed, leg_pairs
 from airborne.errors import ResultError
 from airborne.geometry.rotations import (
     angles_from_matrix,
@@ -179,7 +179,7 @@ def _may_swap(motion: Motion, model: BodyModel) -> NDArray[np.bool_]:
     joints_m = model.pose_segments(motion.R[rows], motion.position[rows], motion.joint_angles[rows])[1]
     crossed[rows] = are_crossed(model, joints_m)
     owners = model.landmark_segments
-    return crossed[:, None] & np.isin(owners, [segment for legs in paired_legs(model) for segment in legs.ravel()])
+    return crossed[:, None] & np.isin(owners, [segment for legs in leg_pairs(model) for segment in legs.ravel()])
 
 
 def continuous_angles(motion: Motion) -> Array:

@@ -4,7 +4,7 @@ from airborne.rendering.drawing import Rendering, render
 from airborne.rendering.evidence import EvidenceMaps, evidence_maps, mask_evidence, mask_out_surface
 from airborne.rendering.lights import FLAT, Lamp, Lights
 from airborne.rendering.pictures import mask_picture, match_picture, model_picture, through_mask
-from airborne.rendering.scores import RULES, ScoreRule, colour_sums, missed_pixels, score, scores_from_sums
+from airborne.rendering.scores import RULES, ScoreRule, colour_sums, count_missed_pixels, score, scores_from_sums
 from airborne.rendering.targets import Targets, pack_targets
 
 __all__ = [
@@ -17,12 +17,12 @@ __all__ = [
     "ScoreRule",
     "Targets",
     "colour_sums",
+    "count_missed_pixels",
     "evidence_maps",
     "mask_evidence",
     "mask_out_surface",
     "mask_picture",
     "match_picture",
-    "missed_pixels",
     "model_picture",
     "pack_targets",
     "render",

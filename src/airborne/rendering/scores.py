@@ -57,10 +57,10 @@ def score(
     thread may be given a workspace of `new_shapes`, which takes as long as half a hypothesis.
     """
     sums = colour_sums(geometry, targets, R, t, rule=rule, shapes=shapes, threads=threads)
-    return scores_from_sums(sums, rule, missed_pixels(geometry, targets, R, t, rule=rule, threads=threads))
+    return scores_from_sums(sums, rule, count_missed_pixels(geometry, targets, R, t, rule=rule, threads=threads))
 
 
-def missed_pixels(
+def count_missed_pixels(
     geometry: SurfaceArrays, targets: Targets, R: Array, t: Array, *, rule: ScoreRule, threads: int = 1
 ) -> NDArray[np.float64] | None:
     """Count the foreground outside the mask of each hypothesis in each view: (n, views); None if it does not count."""

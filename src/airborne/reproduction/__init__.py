@@ -4,15 +4,21 @@ from airborne.reproduction.block.experiment import reproduce_blockjump
 from airborne.reproduction.rigid.curves import Curve, half_width, score_curves
 from airborne.reproduction.rigid.experiment import reproduce_rigid
 from airborne.reproduction.rigid.sensitivity import CASES, Case
-from airborne.reproduction.rigid.somersaults import RIGID_METHODS, Errors, Experiment, make_experiment, track_experiment
+from airborne.reproduction.rigid.somersaults import (
+    RIGID_METHODS,
+    Experiment,
+    RunErrors,
+    make_experiment,
+    track_experiment,
+)
 
 __all__ = [
     "CASES",
     "RIGID_METHODS",
     "Case",
     "Curve",
-    "Errors",
     "Experiment",
+    "RunErrors",
     "half_width",
     "make_experiment",
     "reproduce_blockjump",

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
-from airborne.body.files import mesh_files, write_body
+from airborne.body.files import find_mesh_files, write_body
 from airborne.body_fitting.first_frames import EVERY, N_FRAMES, fit_preset
 from airborne.body_fitting.landmark_places import place_landmarks
 from airborne.calibration.from_points import Calibration
@@ -38,7 +38,7 @@ from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.run.untracked import explain_untracked
 from airborne.run.whole_run import FittedRun, fit_whole_run
-from airborne.run.wrong_colours import wrong_colours
+from airborne.run.wrong_colours import find_wrong_colours
 from airborne.tracking import Estimate, Status
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose import FirstPose
@@ -103,7 +103,7 @@ class BodyRun:
     def copy_inputs(self, folder: Path) -> None:
         """Write the body beside the results, for `airborne evaluate` and for other tools."""
         file = self.trial.body.file
-        if file is None or mesh_files(self.trial.path(file)):  # meshes get names of our own, beside the body's
+        if file is None or find_mesh_files(self.trial.path(file)):  # meshes get names of our own, beside the body's
             write_body(folder / BODY, self.model)
         else:
             shutil.copyfile(self.trial.path(file), folder / BODY)
@@ -242,7 +242,7 @@ class BodyRun:
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
         findings = [*([measured.wrong_fall.to_dict()] if measured.wrong_fall else []), *checked.findings]
-        of_colours = wrong_colours(model, motion, self.kept)
+        of_colours = find_wrong_colours(model, motion, self.kept)
         self.recording.events.extend([*checked.doubts, *of_colours, *far_keys(self.trial, model, motion, rig)])
         if not motion.count(Status.TRACKED) and len(motion) > 1 and not checked.is_start_wrong:
             args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")

@@ -15,7 +15,7 @@ from airborne.run.detections import read_trial_detections
 from airborne.run.find import require_two_cameras
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
-from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds, undecided_mix_ups
+from airborne.run.mix_ups import find_undecided_mix_ups, refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import (
     Opened,
     dark_start_error,
@@ -219,7 +219,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
                     seen = recording.rig, list(foregrounds), model, found.pose
                     checks.attempt(
                         lambda: refuse_mix_ups(*seen),
-                        lambda _: _UNDECIDED if undecided_mix_ups(*seen) else _NO_MIX_UP,
+                        lambda _: _UNDECIDED if find_undecided_mix_ups(*seen) else _NO_MIX_UP,
                     )
     for event in recording.events:
         checks.add(f"note: {event}")

@@ -246,9 +246,9 @@ def _check_different(option: str, paths: Sequence[Path], wanted: str) -> None:
 
 def _check_same_videos(folder: Path, repeats: Sequence[Path]) -> None:
     """Raise ResultError where a run has no video in common with the run in a folder, as far as both name theirs."""
-    videos = _recorded_videos(folder)
+    videos = _read_videos_of(folder)
     for other in repeats:
-        others = _recorded_videos(other)
+        others = _read_videos_of(other)
         if videos and others and not set(videos) & set(others):
             names = ", ".join([*others.values()][:3])
             raise ResultError(
@@ -257,7 +257,7 @@ def _check_same_videos(folder: Path, repeats: Sequence[Path]) -> None:
             )
 
 
-def _recorded_videos(folder: Path) -> dict[str, str]:
+def _read_videos_of(folder: Path) -> dict[str, str]:
     """Return the names of the videos of the run in a folder by their digests; {} where it names none."""
     record = folder / run_folder.RUN_RECORD
     inputs = read_record(record).get("inputs") if record.is_file() else None

@@ -16,7 +16,7 @@ from airborne.export.c3d import write_c3d
 from airborne.export.gltf import write_animation
 from airborne.export.opensim_model import write_osim
 from airborne.export.opensim_motion import write_mot
-from airborne.export.tables import Columns, body_columns, players_columns, write_csv, write_parquet
+from airborne.export.tables import Columns, body_columns, players_columns, write_csv, write_wide_parquet
 from airborne.export.takes import Take, body_take, player_takes, portable_names, with_axis_markers
 from airborne.export.trc import write_trc
 from airborne.io.parquet import CAN_WRITE_PARQUET
@@ -158,7 +158,7 @@ def _write(format: str, folder: Path, stem: str, read: _RunData) -> list[Path]:
         "c3d": lambda path: write_c3d(path, read.takes),
         "gltf": lambda path: write_animation(path, read.takes),
         "csv": lambda path: write_csv(path, read.columns),
-        "parquet": lambda path: write_parquet(path, read.columns),
+        "parquet": lambda path: write_wide_parquet(path, read.columns),
     }
     if format in together:
         path = folder / f"{stem}.{'glb' if format == 'gltf' else format}"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from airborne import __version__
-from airborne.body.files import mesh_files
+from airborne.body.files import find_mesh_files
 from airborne.cameras.files import files_beside
 from airborne.errors import ResultError, RunThereError
 from airborne.export import write_json
@@ -83,7 +83,7 @@ def prepare_folder(
     if not rows.exists():
         write_json(record, identity)
         return False
-    recorded = _recorded_identity(folder, identity)
+    recorded = _read_identity(folder, identity)
     changed = [name for name in identity if recorded.get(name) != identity[name]]
     is_corrected = table == MOTION and bool(changed) and set(changed) <= {"keys", "masks"}
     if changed and not is_corrected:
@@ -110,10 +110,10 @@ def prepare_folder(
 def is_finished(folder: Path, identity: dict[str, Any]) -> bool:
     """Say whether a folder holds a run of this identity that has its summary."""
     is_whole = (folder / RUN_RECORD).is_file() and (folder / SUMMARY).is_file()
-    return is_whole and _recorded_identity(folder, identity) == identity
+    return is_whole and _read_identity(folder, identity) == identity
 
 
-def _recorded_identity(folder: Path, identity: dict[str, Any]) -> dict[str, Any]:
+def _read_identity(folder: Path, identity: dict[str, Any]) -> dict[str, Any]:
     """Return the identity of the run in a folder, written as this one is."""
     return _with_settings(_with_keys(read_record(folder / RUN_RECORD), identity), identity)
 
@@ -197,7 +197,7 @@ def holds_run_of(trial: Trial, folder: Path) -> bool:
     return record.is_file() and read_record(record) == run_identity(trial)
 
 
-def recorded_take(folder: Path) -> int | None:
+def read_choice(folder: Path) -> int | None:
     """Return which of the poses that were found the run in a folder was told to take; None where it was told none."""
     record = folder / RUN_RECORD
     return read_record(record).get("take") if record.is_file() else None
@@ -260,7 +260,7 @@ def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
     return {name: file_digest(trial.path(name)) for name in names} | _table_digests(trial)
 
 
-def changed_tables(trial: Trial, folder: Path) -> list[str]:
+def find_changed_tables(trial: Trial, folder: Path) -> list[str]:
     """Return which of a trial's [start], [lights], [calibration], [body], [[camera]] changed since its run in a folder.
 
     Not of what lies in files; nor of a start that is found, as the run holds it as it was found.
@@ -287,7 +287,7 @@ def _table_digests(trial: Trial) -> dict[str, str]:
 def _further_files(trial: Trial) -> list[str]:
     """Return what the named files name in turn: a body's meshes, the other half of a calibration in two files."""
     body, calibration = trial.body.file, trial.calibration.file
-    meshes = [] if body is None else [str(Path(body).parent / name) for name in mesh_files(trial.path(body))]
+    meshes = [] if body is None else [str(Path(body).parent / name) for name in find_mesh_files(trial.path(body))]
     halves = [] if calibration is None else [path.name for path in files_beside(trial.path(calibration))]
     return meshes + [str(Path(calibration or "").parent / name) for name in halves]
 

@@ -41,13 +41,13 @@ def far_keys(trial: Trial, model: BodyModel, motion: Motion, rig: Rig) -> list[s
     """Return a sentence for each key by hand from which the tracked body is farther than chance takes it."""
     rows = {int(index): row for row, index in enumerate(motion.index) if motion.has_pose[row]}
     poses = [(key, motion.pose(rows[key.frame])) for key in trial.key if key.frame in rows]
-    misses = [(key.frame, miss_by_hand(trial, key, model, pose, rig)) for key, pose in poses]
+    misses = [(key.frame, miss_by_hand(trial, key, model, pose, rig=rig)) for key, pose in poses]
     return [
         f"[[key]] of frame {frame}: {far.words}{far.advice}" for frame, far in misses if far is not None and far.is_far
     ]
 
 
-def miss_by_hand(trial: Trial, key: KeyTable, model: BodyModel, pose: Pose, rig: Rig) -> KeyMiss | None:
+def miss_by_hand(trial: Trial, key: KeyTable, model: BodyModel, pose: Pose, *, rig: Rig) -> KeyMiss | None:
     """Return how far a pose is from what was set by hand in a key, where it is farthest; None where nothing was."""
     if not key.model_fields_set & (BY_HAND | {"joints_m", "points_px"}):
         return None

@@ -175,7 +175,7 @@ def possible_mix_ups(n_cameras: int) -> list[MixUp]:
     return [*map(MixUp, exchanged), *map(MixUp, alone), *(MixUp(camera, is_turned=True) for camera in alone)]
 
 
-def undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyModel, start: Pose) -> list[MixUp]:
+def find_undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyModel, start: Pose) -> list[MixUp]:
     """Return the mix-ups that what stands out in the cameras at the start does not speak against.
 
     It does where an image agrees with its own camera's silhouette better than as the mix-up would have it. Beside each

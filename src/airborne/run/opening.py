@@ -180,7 +180,7 @@ def read_or_calibrate(trial: Trial, facts: Mapping[str, VideoFacts]) -> tuple[Ri
         points = points.select(list(sizes))
         for camera, px in zip(points.cameras, np.moveaxis(points.px, 1, 0), strict=True):
             if is_turned(px, sizes[camera]):
-                raise _turned_error(trial, camera, facts[camera])
+                raise _rotation_error(trial, camera, facts[camera])
         calibration = calibrate(points, sizes, method=trial.calibration.method)
         require_plausible(calibration)
         return calibration.rig, calibration
@@ -195,7 +195,7 @@ def read_or_calibrate(trial: Trial, facts: Mapping[str, VideoFacts]) -> tuple[Ri
     return Rig(cameras), None
 
 
-def _turned_error(trial: Trial, camera: str, facts: VideoFacts) -> TrialError:
+def _rotation_error(trial: Trial, camera: str, facts: VideoFacts) -> TrialError:
     """Return the error of a video that lies on its side in comparison with its camera's control points."""
     width, height = facts.size
     flag = f", by the flag in the file that turns it by {facts.rotation_deg} degrees" if facts.rotation_deg else ""

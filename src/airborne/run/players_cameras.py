@@ -11,7 +11,7 @@ from airborne.constants import ALARM_SDS
 from airborne.geometry.even_sample import EvenSample
 from airborne.tracking import Status
 from airborne.tracking.camera_lags import solve_lags
-from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, moment_of
+from airborne.tracking.capsules.camera_evidence import LagMoment, lag_equations, moment_of
 from airborne.tracking.capsules.occlusion import shows_player
 from airborne.tracking.players import PlayersStep
 from airborne.video import Frames
@@ -60,7 +60,7 @@ class CameraCheck:
     """What cameras say of the players at some moments of a run, spread evenly over it, and how often they show them."""
 
     def __init__(self) -> None:
-        self._moments: defaultdict[str, EvenSample[Moment]] = defaultdict(lambda: EvenSample(_MOST_MOMENTS))
+        self._moments: defaultdict[str, EvenSample[LagMoment]] = defaultdict(lambda: EvenSample(_MOST_MOMENTS))
         self._n_times = 0
         self._n_found: Counter[int] = Counter()  # by camera: players found while it had an image
         self._n_shown: Counter[int] = Counter()  # and those of them that it shows

@@ -21,7 +21,7 @@ from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.self_check.nuisances import MEASURED_SD, ONE_CAMERA_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
-from airborne.tracking.self_check.roughness import PathFinding, find_wrong_path, roughness
+from airborne.tracking.self_check.roughness import PathFinding, find_wrong_path, measure_roughness
 from airborne.types import Array
 
 # of the sizes of body and world, chosen: at a rate 10 % too low those of a throw were 23.2 and 23.4 %
@@ -74,7 +74,7 @@ def check_run(
     frames = sorted(kept, key=lambda each: each.index)
     poses = [motion.pose(row) for row in rows]
     path = TrackedPath(motion.index[rows], motion.time_s[rows], poses, motion.covariance[rows, :6, :6])
-    rough = np.ones(2) if model.has_joints else roughness(path, motion.status[rows] == Status.TRACKED.value)
+    rough = np.ones(2) if model.has_joints else measure_roughness(path, motion.status[rows] == Status.TRACKED.value)
     excess = np.zeros((len(motion), 6, 6))
     excess[rows] = _excess(path.covariance, rough)
     of_path = None if model.has_joints else find_wrong_path(path, rough)

@@ -28,7 +28,7 @@ from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
-from airborne.run.folder import is_finished, list_tables, prepare_folder, recorded_take, run_identity
+from airborne.run.folder import is_finished, list_tables, prepare_folder, read_choice, run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, dark_start_error, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun
@@ -92,7 +92,7 @@ def track_trial(
     if live and trial.start.find:
         raise ResultError("a live run looks for nobody; give [[start.player]] tables")
     if resume and take is None and trial.start.find:
-        take = recorded_take(folder)
+        take = read_choice(folder)
     if take is not None and not trial.start.find:
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")
     started_s = time.monotonic()
@@ -140,7 +140,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     """Track an opened subject and write its results; the connection to live cameras ends with the tracking."""
     folder, recording = options.folder, subject.recording
     identity = run_identity(subject.trial, live=options.live, take=options.take)
-    if options.resume and (finished := _finished_run(folder, identity, subject.table, options.drawn)):
+    if options.resume and (finished := _read_finished_run(folder, identity, subject.table, options.drawn)):
         return finished
     goes_on = prepare_folder(folder, identity, subject.table, resume=options.resume, overwrite=options.overwrite)
     write_pose2sim(folder / CALIBRATION, recording.rig)
@@ -184,7 +184,9 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     return TrackResult(motion, summary)
 
 
-def _finished_run(folder: Path, identity: dict[str, Any], table: str, drawn: OverlaysAs | None) -> TrackResult | None:
+def _read_finished_run(
+    folder: Path, identity: dict[str, Any], table: str, drawn: OverlaysAs | None
+) -> TrackResult | None:
     """Return the run that a folder holds; None where something is still to be tracked or drawn."""
     if not is_finished(folder, identity) or (drawn is not None and not (folder / REPORT).is_file()):
         return None

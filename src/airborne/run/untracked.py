@@ -13,7 +13,7 @@ import numpy as np
 
 from airborne.body import BodyModel, Pose
 from airborne.body.shaping import with_size
-from airborne.run.mix_ups import MixUp, start_foregrounds, undecided_mix_ups
+from airborne.run.mix_ups import MixUp, find_undecided_mix_ups, start_foregrounds
 from airborne.tracking import Estimate, Status
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.tracker import track_frames
@@ -69,7 +69,7 @@ def explain_untracked(
         return explanation
     names = recording.rig.names
     with start_foregrounds(recording) as foregrounds:
-        mix_ups = undecided_mix_ups(recording.rig, list(foregrounds), model, start)
+        mix_ups = find_undecided_mix_ups(recording.rig, list(foregrounds), model, start)
     changes = [_Change(model, mix_up.undo, mix_up=mix_up) for mix_up in mix_ups]
     if len(names) > _FEWEST_CAMERAS:
         changes += [_Change(model, partial(_leave_out, i), camera=name) for i, name in enumerate(names)]

@@ -86,12 +86,14 @@ def fit_whole_run(
         rows, time_s = window.rows, motion.time_s[window.rows]
         poses = [motion.pose(row) for row in rows]
         if not is_joined:
-            poses = bridge_lost_limbs(model, poses, time_s, motion.covariance[rows], window.stretches)
+            poses = bridge_lost_limbs(
+                model, poses, time_s, covariances=motion.covariance[rows], stretches=window.stretches
+            )
         look = _Look(images, window, shown[rows])
         fit = fit_run(model, poses, time_s, window.stretches, look, n_steps=images.n_steps)
         own = images.assess(fit.poses, window, motion)
         errors = smooth_errors(model, fit, time_s, window.stretches, own)
-        offsets.append(constant_offsets(model, rows, fit.poses, errors, window.kept))
+        offsets.append(constant_offsets(model, rows, fit.poses, errors, kept=window.kept))
         for row, pose, each in list(zip(rows, fit.poses, errors.covariances, strict=True))[window.kept]:
             matrix = pose.world_from_root.as_matrix()
             position[row], R[row], angles[row] = matrix[:3, 3], matrix[:3, :3], pose.joint_angles
@@ -204,7 +206,7 @@ class _RunImages:
             found = self.tracker.linearise(self.learned, frames, path, misfit, surface=surface, shown=taught)
         finally:
             self.surfaces.append(surface)
-        return _tracked_evidence(tracked, path[-1][1], found) if frames.index in self.keys else found
+        return _evidence_of_tracker(tracked, path[-1][1], found) if frames.index in self.keys else found
 
     def assess(self, poses: Sequence[Pose], window: _Window, motion: Motion) -> Array:
         """Return the covariances of a window's frames by themselves (n, d, d), where limbs were unknown at its poses.
@@ -286,7 +288,7 @@ def _with_known(covariance: Array, found: Array) -> Array:
     return joined
 
 
-def _tracked_evidence(estimate: Estimate, pose: Pose, images: ImageEvidence) -> ImageEvidence:
+def _evidence_of_tracker(estimate: Estimate, pose: Pose, images: ImageEvidence) -> ImageEvidence:
     """Return what a tracker's estimate says about a pose, by its covariance, in the place of images."""
     assert estimate.pose is not None and estimate.covariance is not None
     information, away = invert_known(estimate.covariance), delta_between(pose, estimate.pose)

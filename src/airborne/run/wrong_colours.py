@@ -25,7 +25,7 @@ _OF_PERSON = "is it another person's file, or in other clothes", "Fit it anew (a
 _OF_THING = "is it another thing's file, or are red and blue exchanged in the videos", "Correct the file"
 
 
-def wrong_colours(model: BodyModel, motion: Motion, kept: Iterable[Frames]) -> list[str]:
+def find_wrong_colours(model: BodyModel, motion: Motion, kept: Iterable[Frames]) -> list[str]:
     """Return, as a sentence, that a body has other colours than images show at tracked poses, up to a light."""
     rows = {int(index): row for row, index in enumerate(motion.index) if motion.status[row] == Status.TRACKED.value}
     shown = islice(((frames, motion.pose(rows[frames.index])) for frames in kept if frames.index in rows), _N_FRAMES)

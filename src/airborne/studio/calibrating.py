@@ -142,7 +142,7 @@ def _report_of(folder: Path, file: str) -> Iterator[dict[str, Any]]:
         raise TrialError(f"{path} is no report of a calibration; calibrate again, or remove it") from None
 
 
-def write_report(folder: Path, text: str) -> None:
+def write_calibration_report(folder: Path, text: str) -> None:
     """Keep what a calibration said beside its pictures. Raises TrialError where that leads out of the folder."""
     path = folder / REPORT / _SAID
     if not is_inside(folder, path):

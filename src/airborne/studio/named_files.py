@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from airborne.body.files import mesh_files
+from airborne.body.files import find_mesh_files
 from airborne.errors import AirborneError, TrialError
 from airborne.io.text import read_toml
 from airborne.studio.folder import path_inside
@@ -58,7 +58,7 @@ def _read_tables(folder: Path, path: Path) -> tuple[dict[str, Any], Path]:
 def refuse_outer_meshes(folder: Path, body: Path) -> None:
     """Raise AirborneError where a mesh of a body file lies outside the folder."""
     try:
-        names = mesh_files(body)
+        names = find_mesh_files(body)
     except (AirborneError, OSError):  # which is said where the body is read
         return
     for name in names:

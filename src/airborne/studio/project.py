@@ -15,7 +15,7 @@ from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError, one_line
 from airborne.io.folder_lock import find_writer
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
-from airborne.run.folder import changed_tables
+from airborne.run.folder import find_changed_tables
 from airborne.studio.clicks import count_clicked, read_clicked
 from airborne.studio.folder import files_inside, outer_links, path_inside, readable_files
 from airborne.studio.named_files import read_inner_tables, refuse_outer_meshes
@@ -228,10 +228,10 @@ def _start_state(project: Project) -> tuple[StepState, str]:
     return "needs you", "where is the body?"
 
 
-def _changed_tables(project: Project, run: Path) -> list[str]:
+def _find_changed_tables(project: Project, run: Path) -> list[str]:
     """Return which of the trial's tables have changed since a run; none where they cannot be read."""
     try:
-        return changed_tables(project.trial(), run)
+        return find_changed_tables(project.trial(), run)
     except AirborneError:
         return []
 
@@ -240,7 +240,7 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
     runs = list_runs(project.folder)
     is_prepared = all(state == "ready" for state, _ in (_cameras_state(project), _body_state(project)))
     finished, says = [run for run in runs if (run / SUMMARY).is_file()], ""
-    changed = _changed_tables(project, finished[0]) if finished else []
+    changed = _find_changed_tables(project, finished[0]) if finished else []
     if changed:
         says = f"{finished[0].name} is of another {' and '.join(changed)} than now; track again"
         yield StudioStep("Track", "/track", "needs you", says)

@@ -57,7 +57,7 @@ def player_file(player: str, frame: int) -> str:
     return f"start_{player}_{frame}.csv"
 
 
-def read_players(folder: Path, frame: int) -> dict[str, Clicked]:
+def read_clicked_players(folder: Path, frame: int) -> dict[str, Clicked]:
     """Read the points of all players that are clicked in a frame. Raises CalibrationError."""
     named = re.compile(player_file("(.+)", frame))
     found = [(named.fullmatch(path.name), path) for path in files_inside(folder, ".csv")]

@@ -100,7 +100,7 @@ def _describe_keys(run: Path, trial: Trial, keys: Sequence[KeyTable]) -> list[st
             told.append((np.inf, f"frame {key.frame} is now lost: {_LOST}"))
             continue
         doubt = "" if status == Status.TRACKED.value else f", which is {status},"
-        far = miss_by_hand(trial, key, model, pose, rig)
+        far = miss_by_hand(trial, key, model, pose, rig=rig)
         words = f"at frame {key.frame}{doubt}" + ("" if far is None else f" {far.words}{far.advice}")
         told.append((0.0 if far is None else far.sds, words))
     told = [words for _, words in sorted(told, key=lambda each: -each[0])]

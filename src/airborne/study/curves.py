@@ -45,7 +45,7 @@ def read_curve(trial: StudyTrial, variable: str) -> RunCurve:
     for name in _WIDE:
         table = _read(trial.folder / name)
         if variable in table:
-            return _drop_unknown(trial, variable, table["time_s"], table[variable], table.get(f"{variable}_sd"))
+            return _drop_unknown(trial, variable, table["time_s"], table[variable], sd=table.get(f"{variable}_sd"))
     named = re.fullmatch(r"(.+)_([xyz])_(m|deg)", variable)
     for name, (unit, sd) in _LONG.items():
         table = _read(trial.folder / name)
@@ -57,7 +57,7 @@ def read_curve(trial: StudyTrial, variable: str) -> RunCurve:
         column = table.get(f"{named[2]}_{unit}")
         if mask.any() and column is not None:
             stated = table.get(sd.format(axis=named[2]), np.full(len(mask), ""))
-            return _drop_unknown(trial, variable, table["time_s"][mask], column[mask], stated[mask])
+            return _drop_unknown(trial, variable, table["time_s"][mask], column[mask], sd=stated[mask])
     listed = list_curves(trial)
     if variable in listed:  # of players, and none of them is this athlete
         raise ResultError(f"{trial.name}: its run has no player '{trial.athlete}'; name players as their athletes")
@@ -167,6 +167,7 @@ def _drop_unknown(
     variable: str,
     time_s: NDArray[np.str_],
     values: NDArray[np.str_],
+    *,
     sd: NDArray[np.str_] | None,
 ) -> RunCurve:
     """Return the curve of three columns where its values are known."""

@@ -116,7 +116,9 @@ def estimate_difference(cells: Cells, a: int, b: int) -> Difference:
         shares = 1 / cells.counts(both, a) + 1 / cells.counts(both, b)
         value, variance, between = pool(means[1] - means[0], shares[:, None] * within)
         freedom = np.full(value.shape, len(both) - 1.0)
-        return _difference("within athletes", value, variance, freedom, np.sqrt(between), (means[0], means[1]))
+        return _difference(
+            "within athletes", value, variance, freedom, sd_athletes=np.sqrt(between), samples=(means[0], means[1])
+        )
     if len(np.union1d(of_a, of_b)) == 1:
         samples = tuple(cells.values[cells.condition == condition] for condition in (a, b))
         pooled = [_plain_mean(each) for each in samples]
@@ -136,7 +138,9 @@ def estimate_difference(cells: Cells, a: int, b: int) -> Difference:
         freedom = variance**2 / sum(
             each[1] ** 2 / (len(sample) - 1) for each, sample in zip(pooled, samples, strict=True)
         )
-    return _difference(level, pooled[1][0] - pooled[0][0], variance, freedom, between, (samples[0], samples[1]))
+    return _difference(
+        level, pooled[1][0] - pooled[0][0], variance, freedom, sd_athletes=between, samples=(samples[0], samples[1])
+    )
 
 
 def pool(means: Array, variances: Array) -> tuple[Array, Array, Array]:
@@ -187,7 +191,7 @@ def _plain_mean(values: Array) -> tuple[Array, Array]:
 
 
 def _difference(
-    level: Level, value: Array, variance: Array, freedom: Array, sd_athletes: Array, samples: tuple[Array, Array]
+    level: Level, value: Array, variance: Array, freedom: Array, *, sd_athletes: Array, samples: tuple[Array, Array]
 ) -> Difference:
     sd = np.sqrt(variance)
     half = student.ppf(0.975, freedom) * sd

@@ -15,7 +15,7 @@ from airborne.sync.silhouettes import MOST_IMAGES
 from airborne.tracking import Status
 from airborne.tracking.camera_lags import LagEquations
 from airborne.tracking.capsules import Blocker
-from airborne.tracking.capsules.camera_evidence import Moment, lag_equations, moment_of
+from airborne.tracking.capsules.camera_evidence import LagMoment, lag_equations, moment_of
 from airborne.trial.file import Trial
 from airborne.types import Array, Progress
 
@@ -33,7 +33,7 @@ def offsets_by_players(
 
     def measure(lag_s: Array, drift: Array) -> LagEquations:
         now = with_offsets(recording, start_s[0] + np.nan_to_num(lag_s), np.nan_to_num(drift))
-        moments: dict[str, list[Moment]] = {start.name: [] for start in starts if start.has_legs}
+        moments: dict[str, list[LagMoment]] = {start.name: [] for start in starts if start.has_legs}
         tracker = Blocker(starts)
         state = tracker.init()
         for frames in islice(now, MOST_IMAGES):

@@ -26,11 +26,11 @@ def check_sizes(sources: Sequence[VideoSource], rig: Rig, sizes: Sequence[Size])
     also = f" ({join_names([each.name for each, *_ in others])} {verb} too)" if others else ""
     raise VideoError(
         f"{source.name}: {source.path} is {actual} px, but the calibration's camera is {expected} px{also}; give the "
-        f"video that was calibrated, or the calibration of this size{_saved_otherwise(size, calibrated)}"
+        f"video that was calibrated, or the calibration of this size{_advise_on_size(size, calibrated)}"
     )
 
 
-def _saved_otherwise(size: Size, calibrated: Size) -> str:
+def _advise_on_size(size: Size, calibrated: Size) -> str:
     """Say what to write for a video that shows what was calibrated, saved at another size or cut out of it."""
     if tuple(size) == tuple(calibrated)[::-1]:
         return (

@@ -37,7 +37,7 @@ def moved(errors):
 
 
 def deviations(errors, *groups):
-    offsets = [constant_offsets(HUMAN, np.arange(N), POSES, errors, each) for each in groups]
+    offsets = [constant_offsets(HUMAN, np.arange(N), POSES, errors, kept=each) for each in groups]
     return frame_deviations(moved(errors), HUMAN, offsets)
 
 

@@ -40,7 +40,7 @@ def off_m(poses, rows=range(N)):
 def test_lost_limb_starts_from_its_way_between_the_frames_that_know_it(rows):
     poses, covariances = lose(rows)
     assert off_m(poses) > 0.4
-    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE)
+    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances=covariances, stretches=WHOLE)
     assert off_m(bridged) < 0.02
     assert all(bridged[row] is poses[row] for row in range(N) if row not in rows)
 
@@ -49,7 +49,7 @@ def test_unknown_frames_before_and_after_the_jumps_stay():
     poses, covariances = lose([8, 9, 10])
     for row in (6, 7, 11, 12):
         covariances[row, COLUMNS, COLUMNS] = np.inf
-    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE)
+    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances=covariances, stretches=WHOLE)
     assert off_m(bridged) < 0.02
     assert [row for row in range(N) if bridged[row] is not poses[row]] == [8, 9, 10]
 
@@ -58,22 +58,22 @@ def test_limb_that_jumps_back_from_where_it_was_led_is_led_anew_all_the_way():
     poses, covariances = list(TRUTH), lose(range(6, 12))[1]
     for row, turned_rad in zip(range(6, 12), np.linspace(0.1, 1.4, 6), strict=True):
         poses[row] = lose([row], turned_rad)[0][row]
-    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE)
+    bridged = bridge_lost_limbs(HUMAN, poses, TIME_S, covariances=covariances, stretches=WHOLE)
     assert off_m(poses) > 0.4
     assert off_m(bridged) < 0.05
 
 
 def test_limb_that_is_known_or_does_not_jump_stays_where_it_was_tracked():
     for poses, covariances in (lose([8, 9], is_known=True), lose([8, 9], turned_rad=0.1)):
-        assert bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE) == poses
+        assert bridge_lost_limbs(HUMAN, poses, TIME_S, covariances=covariances, stretches=WHOLE) == poses
 
 
 def test_limb_is_not_led_across_a_landing_nor_where_no_frame_knows_it_on_one_side():
     poses, covariances = lose([10, 11, 12, 13])
     landing = [Stretch(slice(0, 12), falls=True), Stretch(slice(12, N), falls=False)]
-    assert bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, landing) == poses
+    assert bridge_lost_limbs(HUMAN, poses, TIME_S, covariances=covariances, stretches=landing) == poses
     poses, covariances = lose(range(18, N))
-    assert bridge_lost_limbs(HUMAN, poses, TIME_S, covariances, WHOLE) == poses
+    assert bridge_lost_limbs(HUMAN, poses, TIME_S, covariances=covariances, stretches=WHOLE) == poses
 
 
 def motion_of(poses, sd_rad=0.01):

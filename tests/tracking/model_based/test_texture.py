@@ -11,7 +11,7 @@ from airborne.body.skin import stretch_skin
 from airborne.body.splitting import faces_between, split_at
 from airborne.rendering.srgb import light_from_srgb
 from airborne.tracking.image_regions import crop_regions
-from airborne.tracking.model_based.image_evidence import image_evidence
+from airborne.tracking.model_based.image_evidence import linearise_evidence
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.texture import cut_patches, with_texture
 from tests.support.people import HUMAN, person
@@ -63,7 +63,7 @@ def patches():
 
 def evidence(body, appearance, index, pose=None, shown=ALL):
     at = pose or SCENE.start(index)
-    return image_evidence(body, at, SCENE.frames(index), appearance, model=HUMAN, shown=shown)
+    return linearise_evidence(body, at, SCENE.frames(index), appearance, model=HUMAN, shown=shown)
 
 
 @pytest.fixture(scope="module")

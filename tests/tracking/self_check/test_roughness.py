@@ -6,7 +6,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from airborne.body import Pose
 from airborne.tracking.self_check.path import TrackedPath
-from airborne.tracking.self_check.roughness import find_wrong_path, roughness
+from airborne.tracking.self_check.roughness import find_wrong_path, measure_roughness
 
 POSITION_SD_M, ROTATION_SD_RAD = 0.002, 0.004
 N, RATE_HZ = 60, 50.0
@@ -31,19 +31,19 @@ EVERY = np.ones(N, bool)
 
 @pytest.mark.parametrize(("position", "rotation"), [(1, 1), (3, 1), (1, 5), (8, 8)])
 def test_the_factor_is_that_of_the_errors(position, rotation):
-    found = np.mean([roughness(path(position, rotation, seed=seed), EVERY) for seed in range(10)], axis=0)
+    found = np.mean([measure_roughness(path(position, rotation, seed=seed), EVERY) for seed in range(10)], axis=0)
     assert found == pytest.approx([position, rotation], rel=0.25)
 
 
 def test_a_path_that_is_smoother_than_stated_leaves_the_errors_as_they_are():
-    assert roughness(path(0.0, 0.2), EVERY).tolist() == [1, 1]
+    assert measure_roughness(path(0.0, 0.2), EVERY).tolist() == [1, 1]
 
 
 def test_errors_that_alternate_between_fields_are_seen():
     smooth = path(0.0, 0.0)
     shift_m, none = 5 * POSITION_SD_M * np.array([0.0, 0.0, 1.0]), np.zeros(3)
     poses = [pose.move(shift_m * (i % 2), none) for i, pose in enumerate(smooth.poses)]
-    position, rotation = roughness(TrackedPath(smooth.index, smooth.time_s, poses, smooth.covariance), EVERY)
+    position, rotation = measure_roughness(TrackedPath(smooth.index, smooth.time_s, poses, smooth.covariance), EVERY)
     assert position > 2 and rotation == 1
 
 
@@ -54,7 +54,7 @@ def test_where_nothing_can_be_compared_nothing_is_multiplied(given):
     if given == "few":
         rough = TrackedPath(rough.index[:6], rough.time_s[:6], rough.poses[:6], rough.covariance[:6])
         tracked = EVERY[:6]
-    assert roughness(rough, tracked).tolist() == [1, 1]
+    assert measure_roughness(rough, tracked).tolist() == [1, 1]
 
 
 def repeated(every, smooth):

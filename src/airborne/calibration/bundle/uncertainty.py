@@ -112,7 +112,7 @@ def redundancies(
         gauge_fixed_inverse(reduced, gauge_directions(problem, state, normal, reduced)) if len(reduced) else reduced
     )
     redundancy = np.zeros(n_sources)
-    leverage = weights[n:] * _leverages(problem.layout, jacobian, factors, back, inverse)
+    leverage = weights[n:] * _leverages(problem.layout, jacobian, factors, back, inverse=inverse)
     for i in range(n_sources):
         rows, columns = source_of_row == i, problem.source_of_column == i
         n_used = (rows[:n] & np.repeat(problem.is_used, 2)).sum()
@@ -122,7 +122,7 @@ def redundancies(
     return np.maximum(redundancy, 1.0)
 
 
-def _leverages(layout: Layout, jacobian: Jacobian, factors: SuperLU | None, back: Array, inverse: Array) -> Array:
+def _leverages(layout: Layout, jacobian: Jacobian, factors: SuperLU | None, back: Array, *, inverse: Array) -> Array:
     """Return `a N^-1 a^T` of the rows a of lengths and lags, which involve no camera: (k + l,)."""
     k, n_rows = len(layout.ends), len(layout.ends) + len(layout.lags)
     leverages = np.zeros(n_rows)

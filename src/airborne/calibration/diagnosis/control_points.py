@@ -162,6 +162,7 @@ def check_solutions(
     sizes: Mapping[str, Size],
     decompositions: Mapping[str, Decomposition],
     candidates: Mapping[str, Sequence[Solution]],
+    *,
     solutions: Mapping[str, Solution],
 ) -> tuple[Finding, ...]:
     """Return what casts doubt on the calibration, each with its camera or point; `candidates`: of all models tried."""

@@ -32,7 +32,7 @@ def refit_pinholes(
     parameters[:, 3:10] = [*start.centre, start.focal_px, start.focal_px, *start.principal_point]
     parameters[:, 10 : 10 + len(start.terms)] = start.terms
     R, damping = np.broadcast_to(start.R, (n_fits, 3, 3)), np.full(n_fits, _FIRST_DAMPING)
-    residual, J = _linearise(R, parameters, own, world, px, kept, start.lens == "fisheye")
+    residual, J = _linearise(R, parameters, own, world, px=px, kept=kept, is_fisheye=start.lens == "fisheye")
     is_open = np.ones(n_fits, bool)
     for _ in range(_MOST_ITERATIONS):
         step, predicted = _levenberg_step(residual, J, damping)
@@ -44,7 +44,7 @@ def refit_pinholes(
         new[:, own] += step
         new[:, 7] = new[:, 6]  # square pixels
         new_R = Rotation.from_rotvec(step[:, :3]).as_matrix() @ R
-        new_residual, new_J = _linearise(new_R, new, own, world, px, kept, start.lens == "fisheye")
+        new_residual, new_J = _linearise(new_R, new, own, world, px=px, kept=kept, is_fisheye=start.lens == "fisheye")
         gains = is_open & (np.sum(new_residual**2, axis=1) < cost)  # False where a point came behind the camera
         parameters, R = np.where(gains[:, None], new, parameters), np.where(gains[:, None, None], new_R, R)
         residual, J = np.where(gains[:, None], new_residual, residual), np.where(gains[:, None, None], new_J, J)
@@ -56,7 +56,7 @@ def refit_pinholes(
 
 
 def _linearise(
-    R: Array, parameters: Array, own: list[int], world: Array, px: Array, kept: NDArray[np.bool_], is_fisheye: bool
+    R: Array, parameters: Array, own: list[int], world: Array, *, px: Array, kept: NDArray[np.bool_], is_fisheye: bool
 ) -> tuple[Array, Array]:
     """Return the residuals (f, 2 n) and their derivatives (f, 2 n, p), zero for the points left out."""
     n_fits, n = kept.shape

@@ -46,7 +46,7 @@ def frame_of_three_points(origin: Array, along_x: Array, in_xy: Array) -> RigidT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gravity:
+class GravityDirection:
     """The vertical and gravity, estimated from bodies in free flight."""
 
     up: Array  # (3,) unit vector, in the present world
@@ -71,7 +71,7 @@ class Gravity:
         )
 
 
-def estimate_gravity(times_s: Array, throws: Sequence[Array]) -> Gravity:
+def estimate_gravity(times_s: Array, throws: Sequence[Array]) -> GravityDirection:
     """Estimate gravity from bodies in free flight: parabolas with one common acceleration, fitted robustly.
 
     times_s (t,) [s], throws: each (t, 3) [m] in the old world, NaN where not seen or not in the air; a ball is good, of
@@ -94,10 +94,10 @@ def estimate_gravity(times_s: Array, throws: Sequence[Array]) -> Gravity:
     up = -g / magnitude
     across = np.eye(3) - np.outer(up, up)
     tilt = float(np.sqrt(np.linalg.eigvalsh(across @ covariance @ across)[-1])) / magnitude
-    return Gravity(up, tilt, magnitude, float(np.sqrt(up @ covariance @ up)), len(flights))
+    return GravityDirection(up, tilt, magnitude, float(np.sqrt(up @ covariance @ up)), len(flights))
 
 
-def frame_of_gravity(gravity: Gravity, origin: Array, along_x: Array) -> RigidTransform:
+def frame_of_gravity(gravity: GravityDirection, origin: Array, along_x: Array) -> RigidTransform:
     """Return new_from_old of the world with z up, this origin, and x toward a second point (3,) [m], made level."""
     x = np.asarray(along_x - origin, float)
     level = x - (x @ gravity.up) * gravity.up

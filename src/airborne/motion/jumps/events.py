@@ -55,7 +55,7 @@ class FlightPosterior:
         return self.parabola[:, 1] - GRAVITY_M_S2 * (at_s - self.origin_s)
 
 
-class Fall(NamedTuple):
+class JumpFall(NamedTuple):
     """The centre of mass in a run of rows as a parabola of any acceleration; NaN where fewer than five are known."""
 
     acceleration_m_s2: float  # upward
@@ -91,18 +91,18 @@ def find_slow_falls(track: LegTrack) -> tuple[tuple[int, int, float], ...]:
     return tuple(slow)
 
 
-def measure_fall(track: LegTrack, rows: tuple[int, int]) -> Fall:
+def measure_fall(track: LegTrack, rows: tuple[int, int]) -> JumpFall:
     """Fit a parabola to the centre of mass from a first to a last row."""
     time_s, height, variance = _centre_of_mass_heights(track, rows[0], rows[1] + 1)
     if len(time_s) < 5:
-        return Fall(np.nan, np.nan, np.nan)
+        return JumpFall(np.nan, np.nan, np.nan)
     weight = np.linalg.inv(noise_covariance(time_s, variance, sway_m=SWAY_M))
     terms = np.vander(time_s - time_s.mean(), 3)
     covariance = np.linalg.inv(terms.T @ weight @ terms)
     solution = covariance @ terms.T @ weight @ height
     residual = height - terms @ solution
     noise = float(residual @ weight @ residual) / (len(time_s) - 3)
-    return Fall(float(2 * solution[0]), 2 * float(np.sqrt(covariance[0, 0])), noise)
+    return JumpFall(float(2 * solution[0]), 2 * float(np.sqrt(covariance[0, 0])), noise)
 
 
 def _airborne_runs(track: LegTrack) -> list[tuple[int, int]]:
@@ -193,7 +193,7 @@ def _belongs_to_run(track: LegTrack, smooth: Array, last: int, row: int) -> bool
     return bool(gap_s <= (_BRIDGE_S if is_gap else _DIP_S))
 
 
-def _may_fall_freely(fall: Fall) -> bool:
+def _may_fall_freely(fall: JumpFall) -> bool:
     return fall.acceleration_m_s2 - _CLEAR_SDS * fall.sd_m_s2 < _SLOWEST_FALL_M_S2
 
 

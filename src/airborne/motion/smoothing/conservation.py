@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import point_jacobian
@@ -75,7 +76,7 @@ def momentum_rows(model: BodyModel, poses: Sequence[Pose], time_s: Array) -> Joi
     return JoiningRows((rows / sd[..., None])[:, None], np.diff(momentum, axis=0)[:, None] / sd)
 
 
-def _point_masses(model: BodyModel) -> tuple[Array, Array, Array]:
+def _point_masses(model: BodyModel) -> tuple[NDArray[np.int64], Array, Array]:
     """Return whose they are (p,), places in segments (p, 3) [m] and masses (p,) [kg]: six of every segment's."""
     mass, centre, tensor = segment_inertias(model)
     second = np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 2 * np.eye(3) - tensor  # integral of r r' dm

@@ -38,7 +38,7 @@ class ConstantOffsets(NamedTuple):
 
 
 def constant_offsets(
-    model: BodyModel, rows: NDArray[np.intp], poses: Sequence[Pose], errors: SmoothErrors, kept: slice
+    model: BodyModel, rows: NDArray[np.intp], poses: Sequence[Pose], errors: SmoothErrors, *, kept: slice
 ) -> ConstantOffsets:
     """Find the constant offsets in the kept ones of some frames, over those that were fitted and know each.
 

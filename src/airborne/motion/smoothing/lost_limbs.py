@@ -23,7 +23,7 @@ from airborne.types import Array
 
 
 def bridge_lost_limbs(
-    model: BodyModel, poses: Sequence[Pose], time_s: Array, covariances: Array, stretches: Sequence[Stretch]
+    model: BodyModel, poses: Sequence[Pose], time_s: Array, *, covariances: Array, stretches: Sequence[Stretch]
 ) -> list[Pose]:
     """Return the poses (n,) at the times [s], with limbs that jump while unknown on the way between other frames.
 

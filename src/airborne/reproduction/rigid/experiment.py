@@ -26,9 +26,9 @@ from airborne.reproduction.rigid.somersaults import (
     RIGID_METHODS,
     VARIABLE_UNITS,
     VARIABLES,
-    Errors,
     Experiment,
     RigidMethod,
+    RunErrors,
     make_experiment,
     track_experiment,
 )
@@ -78,7 +78,7 @@ _QUICK = _Plan(
     cases=CASES[1:2],
     case_methods=("faithful",),
 )
-_Runs = dict[tuple[Target, int, RigidMethod], Errors]
+_Runs = dict[tuple[Target, int, RigidMethod], RunErrors]
 
 
 def reproduce_rigid(output: Path, *, quick: bool = False, progress: Progress | None = None) -> dict[str, Any]:
@@ -220,7 +220,7 @@ def _over_persons(runs: _Runs, persons: Sequence[int], method: RigidMethod) -> d
     return _statistics(each) | {"rms_of_each": [errors.rms.tolist() for errors in each]}
 
 
-def _statistics(each: Sequence[Errors]) -> dict[str, Any]:
+def _statistics(each: Sequence[RunErrors]) -> dict[str, Any]:
     """Return the mean RMS over runs, the largest error of all, and how many poses were lost."""
     return {
         "rms": np.mean([errors.rms for errors in each], axis=0).tolist(),

@@ -12,7 +12,13 @@ from airborne.body import BodyModel, human18
 from airborne.body.outfits import with_flat_colours
 from airborne.cameras import Camera
 from airborne.rendering import Lamp, Lights
-from airborne.reproduction.rigid.somersaults import Errors, Experiment, RigidMethod, make_experiment, track_experiment
+from airborne.reproduction.rigid.somersaults import (
+    Experiment,
+    RigidMethod,
+    RunErrors,
+    make_experiment,
+    track_experiment,
+)
 from airborne.synthetic.flight.somersault import MASS_KG, STATURE_M
 from airborne.video import Frames, View
 
@@ -47,7 +53,7 @@ CASES = (
 
 def run_case(
     case: Case, unperturbed: Experiment, method: RigidMethod, progress: Callable[[], None] = lambda: None
-) -> Errors:
+) -> RunErrors:
     """Track the somersault with the case's perturbation; progress is called after every pose."""
     experiment = (
         unperturbed if case.noise == 0 else make_experiment("skin", n_poses=len(unperturbed.poses), noise=case.noise)

@@ -64,7 +64,7 @@ class Experiment:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Errors:
+class RunErrors:
     """Estimate minus truth of a run: (n, 6) in the order of `VARIABLES` [mm, deg]; NaN where the body was lost."""
 
     values: Array
@@ -122,7 +122,7 @@ def track_experiment(
     lights: Lights | None = None,
     frames: Iterable[Frames] | None = None,
     progress: Callable[[], None] = lambda: None,
-) -> tuple[Errors, list[Pose | None]]:
+) -> tuple[RunErrors, list[Pose | None]]:
     """Track the poses in turn, each from the last one, and compare with the truth.
 
     Body, lights and frames (with other cameras) may differ from those of the rendering. Progress is called after every
@@ -135,7 +135,7 @@ def track_experiment(
         poses.append(estimate.pose)
         errors.append(np.full(6, np.nan) if estimate.pose is None else _difference(estimate.pose, true))
         progress()
-    return Errors(np.array(errors)), poses
+    return RunErrors(np.array(errors)), poses
 
 
 def tracker_for(method: RigidMethod, model: BodyModel, start: Pose, lights: Lights) -> Tracker:

@@ -22,7 +22,7 @@ from airborne.studio.calibrating import (
     read_report,
     sources_text,
     wand_text,
-    write_report,
+    write_calibration_report,
 )
 from airborne.studio.commands import Command
 from airborne.studio.digitising import list_repetitions
@@ -114,7 +114,7 @@ class CalibratePanel:
         with show_errors():
             values = {"file": CALIBRATED, "control_points": None}
             self.session.set_table("calibration", values, f"calibration by {CALIBRATED}")
-            write_report(self.session.folder, command.output())
+            write_calibration_report(self.session.folder, command.output())
         self.results.refresh()
 
     def _start(self, source: dict[str, Any], media: dict[str, dict[str, Any]]) -> None:

@@ -21,7 +21,7 @@ from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
-from airborne.studio.starts import player_file, read_players, read_start_players
+from airborne.studio.starts import player_file, read_clicked_players, read_start_players
 from airborne.studio.trial_edits import with_players
 from airborne.studio.view import Mark
 from airborne.tracking.players import PlayerStart
@@ -89,7 +89,7 @@ class PlayersPanel(PointsPanel):
     async def reread(self) -> None:
         """Show the clicks that the tables hold now."""
         with show_errors():
-            self.players = read_players(self.session.folder, self.frame)
+            self.players = read_clicked_players(self.session.folder, self.frame)
             self.players.setdefault(self.player, Clicked((), None, {}))
             self.clicked = self.players[self.player]
             self.start_frame, self.starts = await in_thread(

@@ -72,25 +72,35 @@ def draw_clutter(rng: np.random.Generator) -> list[tuple[Array, _Colour]]:
     for row in range(7):
         y, z = 14.0 + 0.9 * row, 0.5 + 0.45 * row
         objects.append(
-            (_upright_rectangle(0.0, y, z - 0.5, 19.0 - 0.8 * row, 0.5), (112 - 3 * row, 111 - 3 * row, 114 - 3 * row))
+            (
+                _upright_rectangle(0.0, y, z - 0.5, width=19.0 - 0.8 * row, height=0.5),
+                (112 - 3 * row, 111 - 3 * row, 114 - 3 * row),
+            )
         )
         for x in np.arange(-9.0 + 0.4 * row, 9.0 - 0.4 * row, 0.62):
             if rng.random() < 0.45:
                 cloth = _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0)
                 x += rng.normal(0, 0.06)
-                objects.append((_upright_rectangle(x, y + 0.02, z, 0.44, 0.55), cloth))
-                objects.append((_upright_rectangle(x, y + 0.01, z + 0.55, 0.2, 0.26), _SKIN * rng.uniform(0.6, 1.05)))
+                objects.append((_upright_rectangle(x, y + 0.02, z, width=0.44, height=0.55), cloth))
+                objects.append(
+                    (_upright_rectangle(x, y + 0.01, z + 0.55, width=0.2, height=0.26), _SKIN * rng.uniform(0.6, 1.05))
+                )
     for x in np.arange(-11.0, 11.1, 2.0):
-        objects.append((_upright_rectangle(x, 12.0, 0.0, 1.96, 0.9), _CLOTHES[rng.integers(len(_CLOTHES))]))
+        objects.append(
+            (_upright_rectangle(x, 12.0, 0.0, width=1.96, height=0.9), _CLOTHES[rng.integers(len(_CLOTHES))])
+        )
     for side in (-1, 1):
         for y in np.arange(-1.0, 11.1, 2.0):
-            board = _upright_rectangle(0.0, 0.0, 0.0, 1.96, 0.9)[:, [1, 0, 2]] + [side * 9.6, y, 0]
+            board = _upright_rectangle(0.0, 0.0, 0.0, width=1.96, height=0.9)[:, [1, 0, 2]] + [side * 9.6, y, 0]
             objects.append((board, _CLOTHES[rng.integers(len(_CLOTHES))] * 0.85))
         for _ in range(5):
             x, y = side * rng.uniform(6.2, 9.0), rng.uniform(-4.0, 9.0)
             size = rng.uniform((0.4, 0.25), (0.8, 0.6))
             objects.append(
-                (_upright_rectangle(x, y, 0.0, *size), _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0))
+                (
+                    _upright_rectangle(x, y, 0.0, width=size[0], height=size[1]),
+                    _CLOTHES[rng.integers(len(_CLOTHES))] * rng.uniform(0.7, 1.0),
+                )
             )
     return objects
 
@@ -112,28 +122,28 @@ def _floor() -> Iterator[tuple[Array, _Colour]]:
 
 
 def _tapes(half: float, top: float, bottom: float) -> Iterator[tuple[Array, _Colour]]:
-    yield _upright_rectangle(0.0, 0.0, top - 0.07, 2 * half, 0.07), _TAPE
-    yield _upright_rectangle(0.0, 0.0, bottom, 2 * half, 0.05), _TAPE
+    yield _upright_rectangle(0.0, 0.0, top - 0.07, width=2 * half, height=0.07), _TAPE
+    yield _upright_rectangle(0.0, 0.0, bottom, width=2 * half, height=0.05), _TAPE
 
 
 def _antennae(top: float, bottom: float) -> Iterator[tuple[Array, _Colour]]:
     for x in (-COURT_M[0] / 2, COURT_M[0] / 2):
-        yield _upright_rectangle(x, 0.0, bottom, 0.05, top - bottom), _TAPE
+        yield _upright_rectangle(x, 0.0, bottom, width=0.05, height=top - bottom), _TAPE
         for k in range(8):
             height = _ANTENNA_M / 8
-            yield _upright_rectangle(x, 0.0, top + k * height, 0.02, height), (_TAPE, (196, 44, 44))[k % 2]
+            yield _upright_rectangle(x, 0.0, top + k * height, width=0.02, height=height), (_TAPE, (196, 44, 44))[k % 2]
 
 
 def _poles() -> Iterator[tuple[Array, _Colour]]:
     for x in (-5.3, 5.3):
-        yield _upright_rectangle(x, 0.0, 0.0, 0.12, 2.55), _POLE
+        yield _upright_rectangle(x, 0.0, 0.0, width=0.12, height=2.55), _POLE
 
 
 def _floor_rectangle(x: float, y: float, width: float, length: float) -> Array:
     return np.array([[x + a * width / 2, y + b * length / 2, 0.0] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
 
 
-def _upright_rectangle(x: float, y: float, z: float, width: float, height: float) -> Array:
+def _upright_rectangle(x: float, y: float, z: float, *, width: float, height: float) -> Array:
     return np.array([[x + a * width / 2, y, z + b * height] for a, b in ((-1, 0), (1, 0), (1, 1), (-1, 1))])
 
 

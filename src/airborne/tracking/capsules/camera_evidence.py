@@ -25,7 +25,7 @@ _PRIOR = np.eye(N_FREE) / WEAK_SD**2
 _PRIOR[:N_DOF, :N_DOF] += POSTURE_INFORMATION
 
 
-class Moment(NamedTuple):
+class LagMoment(NamedTuple):
     """One player at one time, by each of c cameras: equations of the pose and the sliding lengths, n numbers."""
 
     time_s: float
@@ -34,7 +34,7 @@ class Moment(NamedTuple):
     gradient: Array  # (c, n)
 
 
-def moment_of(everybody: Everybody, player: str, frames: Frames) -> Moment:
+def moment_of(everybody: Everybody, player: str, frames: Frames) -> LagMoment:
     """Return what each camera's image says of a player, about the state after the frames' step."""
     track = everybody.players[player]
     tracks = (*everybody.players.values(), *everybody.bystanders)
@@ -48,10 +48,10 @@ def moment_of(everybody: Everybody, player: str, frames: Frames) -> Moment:
         occluders = occluding_capsules(track.state, others)
         information[views], gradient[views] = view_equations(track.state, maps, occluders, N_FREE)
     velocity = np.concatenate([track.filtered.mean[N_FREE:], np.zeros(N_FREE - N_DOF)])
-    return Moment(float(frames.time_s), velocity, information, gradient)
+    return LagMoment(float(frames.time_s), velocity, information, gradient)
 
 
-def lag_equations(moments: Sequence[Moment]) -> LagEquations:
+def lag_equations(moments: Sequence[LagMoment]) -> LagEquations:
     """Stack moments, those of one player after those of another, each in the order of time."""
     time_s = np.array([each.time_s for each in moments])
     step_s = np.diff(time_s)

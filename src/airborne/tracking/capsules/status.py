@@ -12,7 +12,7 @@ from airborne.tracking.capsules.first_frame import points_of
 from airborne.tracking.capsules.fit import JumperFit
 from airborne.tracking.capsules.jumper import N_DOF, PELVIS
 from airborne.tracking.capsules.track import Track, evidence_per_px
-from airborne.tracking.capsules.unseen_legs import find_unseen_legs, unmeasured_covariance
+from airborne.tracking.capsules.unseen_legs import covariance_of_unseen, find_unseen_legs
 from airborne.tracking.estimate import Status, worst_status
 from airborne.tracking.players import PlayerEstimate
 from airborne.types import Array
@@ -36,7 +36,7 @@ def estimate_player(name: str, frames: Frames, track: Track, *, fitted: JumperFi
     covariance = jacobian @ state_covariance @ jacobian.swapaxes(1, 2)
     length_jacobian = _length_jacobian(fitted.state)
     covariance += length_jacobian @ track.shape_covariance @ length_jacobian.swapaxes(1, 2)
-    covariance += unmeasured_covariance(fitted, track.reference_evidence)
+    covariance += covariance_of_unseen(fitted, track.reference_evidence)
     score = evidence_per_px(fitted.owned)
     is_seen = n_views >= 2 and score >= _LEAST_SHARE * track.reference_evidence
     is_tracked = is_seen & (_sd(covariance) < UNCERTAIN_SD_M)
@@ -54,7 +54,7 @@ def estimate_player(name: str, frames: Frames, track: Track, *, fitted: JumperFi
     )
 
 
-def widen(estimate: PlayerEstimate, covariance: Array) -> PlayerEstimate:
+def widen_estimate(estimate: PlayerEstimate, covariance: Array) -> PlayerEstimate:
     """Add covariances (9, 3, 3) [m²] to those of an estimate's points; whose sd is large then is not tracked."""
     widened = estimate.covariance + covariance
     is_wide = _sd(widened) >= UNCERTAIN_SD_M

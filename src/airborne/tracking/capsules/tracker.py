@@ -33,7 +33,7 @@ from airborne.tracking.capsules.kernel_arguments import Capsules
 from airborne.tracking.capsules.occlusion import count_unoccluded, evidence_tables, update_occlusion, with_occlusion
 from airborne.tracking.capsules.recovery import UNOCCLUDED, find_again, is_due
 from airborne.tracking.capsules.registration import check_registration
-from airborne.tracking.capsules.status import SHAPE, estimate_player, widen
+from airborne.tracking.capsules.status import SHAPE, estimate_player, widen_estimate
 from airborne.tracking.capsules.surface_colours import (
     COLOUR_UPDATE_S,
     limit_occlusion,
@@ -81,7 +81,7 @@ class Blocker:
         if registration.left_out != state.registration.left_out:
             after, estimates = self._follow(state._replace(registration=registration), frames)
         wide = registration.covariance
-        widened = (widen(each, wide[each.player]) if each.player in wide else each for each in estimates)
+        widened = (widen_estimate(each, wide[each.player]) if each.player in wide else each for each in estimates)
         return after._replace(registration=registration), tuple(widened)
 
     def _follow(self, state: Everybody, frames: Frames) -> tuple[Everybody, tuple[PlayerEstimate, ...]]:
@@ -91,7 +91,7 @@ class Blocker:
         if not state.players:
             return self._first(frames)
         tracks = [*state.players.values(), *state.bystanders]
-        expected = [_expected_state(track, frames.time_s) for track in tracks]
+        expected = [_predict_state(track, frames.time_s) for track in tracks]
 
         def follow(i: int, name: str) -> tuple[Track, PlayerEstimate]:
             others = [each for j, each in enumerate(expected) if j != i and tracks[j].lost_s is None]
@@ -211,7 +211,7 @@ def _first_track(first: FirstFrameFit, frames: Frames) -> Track:
     )
 
 
-def _expected_state(track: Track, time_s: Fraction) -> Array:
+def _predict_state(track: Track, time_s: Fraction) -> Array:
     """Return the state (35,) in which a player is expected."""
     mean = predict_mean(
         track.filtered, float(time_s - track.time_s), track.sliding, is_airborne=_is_airborne(track.state)

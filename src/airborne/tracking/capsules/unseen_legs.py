@@ -36,7 +36,7 @@ def find_unseen_legs(owned: Array, reference_evidence: float) -> NDArray[np.intp
     return np.flatnonzero(evidence <= _LEAST_SHARE * reference_evidence * area)
 
 
-def unmeasured_covariance(fit: JumperFit, reference_evidence: float) -> Array:
+def covariance_of_unseen(fit: JumperFit, reference_evidence: float) -> Array:
     """Return what nobody measured of points that fewer than two views show: (9, 3, 3) [m2].
 
     Along the ray of the only view, or in all directions. A shank shows ankle and foot, both thigh and shank the knee.

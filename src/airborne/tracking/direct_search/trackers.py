@@ -25,7 +25,7 @@ from airborne.rendering import (
     ScoreRule,
     Targets,
     colour_sums,
-    missed_pixels,
+    count_missed_pixels,
     pack_targets,
     render,
     score,
@@ -236,7 +236,7 @@ class DirectTracker:
         R, t = _move_body(posed, np.concatenate([np.diag(_PROBE), -np.diag(_PROBE)]))
         images = replace(observed, views=views, sizes=sizes, lights=lights)
         sums = colour_sums(self._geometry, images, R, t, rule=self._rule)
-        missed = missed_pixels(self._geometry, observed, R, t, rule=self._rule)
+        missed = count_missed_pixels(self._geometry, observed, R, t, rule=self._rule)
         gradients = []
         for k in range(1 + 2 * n):
             chosen = np.arange(n)

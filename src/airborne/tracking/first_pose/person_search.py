@@ -163,13 +163,17 @@ def _move_limbs(
     for limb in person.limbs:
         joints = limb.segments - 1
         moves = np.concatenate(
-            [angles[:, None, joints], _limb_moves(person.model, limb, angles[:, joints], n, seed, narrower)], axis=1
+            [
+                angles[:, None, joints],
+                _limb_moves(person.model, limb, angles[:, joints], n, seed=seed, narrower=narrower),
+            ],
+            axis=1,
         )
         m, k = moves.shape[:2]
         tried = np.repeat(angles, k, axis=0)
         tried[:, joints] = moves.reshape(m * k, -1, 3)
         moved = PoseSet(np.repeat(poses.R, k, axis=0), np.repeat(poses.t, k, axis=0), tried)
-        covered = _limb_coverage(person, limb, moved, silhouettes, k)
+        covered = _limb_coverage(person, limb, moved, silhouettes, k=k)
         best = covered.argmax(axis=1)
         if judge is not None:
             order = np.argsort(-covered, axis=1, kind="stable")[:, :_N_JUDGED]
@@ -180,7 +184,9 @@ def _move_limbs(
     return replace(poses, angles=angles)
 
 
-def _limb_coverage(person: JointedBody, limb: Limb, moved: PoseSet, silhouettes: SilhouetteEvidence, k: int) -> Array:
+def _limb_coverage(
+    person: JointedBody, limb: Limb, moved: PoseSet, silhouettes: SilhouetteEvidence, *, k: int
+) -> Array:
     """Return what a limb covers beyond the rest of the body, of moves (m k) that k by k share it: (m, k)."""
     R, t = person.segments(moved)
     out = np.zeros((len(R) // k, k))
@@ -195,7 +201,7 @@ def _limb_coverage(person: JointedBody, limb: Limb, moved: PoseSet, silhouettes:
     return out
 
 
-def _limb_moves(model: BodyModel, limb: Limb, angles: Array, n: int, seed: int, narrower: float) -> Array:
+def _limb_moves(model: BodyModel, limb: Limb, angles: Array, n: int, *, seed: int, narrower: float) -> Array:
     """Return a limb's joint angles, n anywhere and n near `angles` (m, joints, 3): (m, 2 n, joints, 3)."""
     m, joints = angles.shape[:2]
     shape = (m, n, joints, 3)

@@ -95,7 +95,7 @@ def search_orientations(thing: Thing, moment: Moment, place: Place) -> list[Pose
         maps = _blur_maps(moment, place, blur * thing.radius_m)
         if number == 0:
             scores = _scores(thing, maps, R, t)
-            best = _apart(thing, R, t, scores, _N_KEPT)
+            best = _apart(thing, R, t, scores, n=_N_KEPT)
             R, t = R[best], t[best]
             continue
         steps = ndtri(sobol_points(6, _N_AROUND * _N_KEPT, seed=number)[: _N_AROUND * len(R)]) / 2 ** (number - 1)
@@ -144,7 +144,7 @@ def fit_image(thing: Thing, moment: Moment, pose: Pose) -> Pose:
 def different_poses(thing: Thing, moment: Moment, poses: Sequence[Pose], n: int) -> list[Pose]:
     """Return the n likeliest of the poses that are apart from each other, the likeliest first."""
     R, t = roots_of(poses)
-    return [poses[i] for i in _apart(thing, R, t, log_likelihoods(thing, moment, poses), n)]
+    return [poses[i] for i in _apart(thing, R, t, log_likelihoods(thing, moment, poses), n=n)]
 
 
 def roots_of(poses: Sequence[Pose]) -> tuple[Array, Array]:
@@ -192,7 +192,7 @@ def _scores(thing: Thing, maps: EvidenceMaps, R: Array, t: Array) -> Array:
     return mask_evidence(thing.render_model.geometry, maps, R[:, None], t[:, None]).sum(axis=1)
 
 
-def _apart(thing: Thing, R: Array, t: Array, scores: Array, n: int) -> list[int]:
+def _apart(thing: Thing, R: Array, t: Array, scores: Array, *, n: int) -> list[int]:
     """Return the indices of the n best poses that are apart from each other, the best first."""
     chosen: list[int] = []
     left = np.ones(len(R), bool)

@@ -164,7 +164,7 @@ class Fitter:
 
     def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
         bodies = [self.render_model.with_pose(pose) for pose in poses]
-        return learned.image_views(self.render_model, bodies, are_narrow=not self.moves_joints)
+        return learned.prepare_views(self.render_model, bodies, are_narrow=not self.moves_joints)
 
     def _refit_limbs(
         self,
@@ -219,7 +219,7 @@ class Fitter:
         if not turned_pelvis.is_improbable(self.model, fit.pose):
             return fit, prior
         back = turned_pelvis.turn_pelvis_back(self.model, fit.pose)
-        free = loose.widen(turned_pelvis.turned_columns(self.model))
+        free = loose.widen(turned_pelvis.pelvis_columns(self.model))
         return self._refit_from(back, fit, learned, prior=prior, widened=free, n_lost=2)
 
     def _refit_from(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import clamp_to_limits, joint_angles_of
-from airborne.body.sides import paired_limbs
+from airborne.body.sides import limb_pairs
 from airborne.types import Array
 
 _LIKELIER_M = 0.05  # mean distance of the limbs' joints by which a swapped pose must be nearer
@@ -19,7 +19,7 @@ def swap_limbs(model: BodyModel, pose: Pose) -> list[Pose]:
     """Return the pose with each pair of limbs swapped: every segment takes its counterpart's orientation."""
     R = model.with_pose(pose).R
     poses = []
-    for limb in paired_limbs(model):
+    for limb in limb_pairs(model):
         R_swapped = R.copy()
         left, right = [i for i, _ in limb], [j for _, j in limb]
         R_swapped[left], R_swapped[right] = R[right], R[left]
@@ -31,7 +31,7 @@ def swap_limbs(model: BodyModel, pose: Pose) -> list[Pose]:
 def counterparts(model: BodyModel) -> NDArray[np.int64]:
     """Return for every segment its counterpart on the other side, or itself: (segments,)."""
     other = np.arange(len(model.segments))
-    for limb in paired_limbs(model):
+    for limb in limb_pairs(model):
         for left, right in limb:
             other[left], other[right] = right, left
     return other

@@ -25,7 +25,7 @@ from airborne.tracking.model_based.degrees_of_freedom import FIRST_POSE_SD, WIDE
 from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, Order
-from airborne.tracking.model_based.image_evidence import ImageEvidence, image_evidence
+from airborne.tracking.model_based.image_evidence import ImageEvidence, linearise_evidence
 from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
@@ -138,7 +138,9 @@ class RefinedTracker:
             backgrounds=turn == 0 or not is_steady,
         )
         if state.n_learned < _BLUR_FRAMES and not self.moves_joints:
-            appearance = learn_blurs(self.render_model, estimate.pose, regions, appearance, motion if before else None)
+            appearance = learn_blurs(
+                self.render_model, estimate.pose, regions, appearance, motion=motion if before else None
+            )
         if not state.past:  # nothing was known of colours before
             shares = self._mask_shares(estimate.pose, regions, appearance)
         reference = state.reference.update(*shares) if shares else state.reference
@@ -187,9 +189,9 @@ class RefinedTracker:
         surface: RenderModel | None = None,
         shown: NDArray[np.bool_] | None = None,
     ) -> ImageEvidence:
-        """Return what the images say about a pose of the body, or of another surface; see `image_evidence`."""
+        """Return what the images say about a pose of the body, or of another surface; see `linearise_evidence`."""
         args = surface or self.render_model, pose, self.reduce_frames(frames), state.appearance
-        return image_evidence(*args, model=self._fitter.model, misfit=misfit, shown=shown)
+        return linearise_evidence(*args, model=self._fitter.model, misfit=misfit, shown=shown)
 
     def reduce_frames(self, frames: Frames) -> Frames:
         """Reduce the images of a body whose joints move: finer ones show more detail than the model has."""

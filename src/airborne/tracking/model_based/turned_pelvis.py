@@ -51,7 +51,7 @@ def turn_pelvis_back(model: BodyModel, pose: Pose) -> list[Pose]:
     return _poses(pose, *_turn(model, pose, _TURNS_BACK_RAD, counterparts(model)))
 
 
-def turned_columns(model: BodyModel) -> NDArray[np.int64]:
+def pelvis_columns(model: BodyModel) -> NDArray[np.int64]:
     """Return the degrees of freedom that turning the pelvis changes: the root's rotation, trunk and limbs on it."""
     segments = np.flatnonzero(limb_of_segment(model) < 0)[1:]
     freed = joints_of(model, np.concatenate([segments, *limbs_on_root(model)]))

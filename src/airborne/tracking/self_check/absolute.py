@@ -28,7 +28,7 @@ _CLEAR_SDS = 3.0  # chosen: a step so long, beside its sd, is no standing still:
 _MOST_SDS = 4.0  # by which the silhouettes may show a pose elsewhere
 
 
-def has_stayed(render_model: RenderModel, start: Pose, now: Pose, first: Frames, later: Frames) -> bool:
+def has_stayed(render_model: RenderModel, start: Pose, now: Pose, *, first: Frames, later: Frames) -> bool:
     """Whether most of what the body covered at its start, and does not cover any more, looks as it did then."""
     vacated = unchanged = covered = 0
     for before, after in zip(first.views, later.views, strict=True):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from airborne.constants import ALARM_SDS
-from airborne.tracking.self_check.nuisances import Kind, Nuisance, widen
+from airborne.tracking.self_check.nuisances import Kind, Nuisance, allow_cause
 from airborne.tracking.self_check.solution import N_BLOCKS, NuisanceSolution
 from airborne.types import Array
 
@@ -93,7 +93,7 @@ def name_causes(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior
         clear = {
             n: score
             for n, score in scores.items()
-            if (score > _LEAST_EVIDENCE and _is_clear(solution, n, widen(prior, n)))
+            if (score > _LEAST_EVIDENCE and _is_clear(solution, n, allow_cause(prior, n)))
             or (n.size == 1 and _is_clear(solution, n, prior))  # a norm of three numbers is never near zero
         }
         if not clear:
@@ -101,16 +101,18 @@ def name_causes(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior
         best = max(clear, key=lambda n: clear[n])
         same = [n for n, score in clear.items() if n is not best and score > clear[best] - _SAME]
         named.append((best, same))
-        prior = widen(prior, best)
+        prior = allow_cause(prior, best)
     alarms: list[LikelyCause] = []
     for best, same in named:
-        without = prior - widen(np.zeros_like(prior), best)
-        others = [LikelyCause(n.subject, n.kind, *_size(solution, n, widen(without, n)), is_alarm=True) for n in same]
+        without = prior - allow_cause(np.zeros_like(prior), best)
+        others = [
+            LikelyCause(n.subject, n.kind, *_size(solution, n, allow_cause(without, n)), is_alarm=True) for n in same
+        ]
         sentences = tuple(each.sentence for each in others)
         value, sd = _size(solution, best, prior)
         alarms += [LikelyCause(best.subject, best.kind, value, sd, is_alarm=True, alternatives=sentences), *others]
     for nuisance in {each for _, same in named for each in same}:
-        prior = widen(prior, nuisance)
+        prior = allow_cause(prior, nuisance)
     listed = {(finding.subject, finding.kind) for finding in alarms}
     others = [
         LikelyCause(n.subject, n.kind, *_size(solution, n, prior), is_alarm=False)
@@ -134,8 +136,8 @@ def _find_drift(
     nothing, found = _log_likelihood(solution, prior), None
     for late in (each for each in nuisances if each.kind == "time_s"):
         drift = Nuisance(late.subject, "drift_s", len(prior), 1)
-        grown, padded = solution.with_growth(late.first), np.pad(widen(prior, late), (0, 1))
-        free = widen(padded, drift)
+        grown, padded = solution.with_growth(late.first), np.pad(allow_cause(prior, late), (0, 1))
+        free = allow_cause(padded, drift)
         evidence = _log_likelihood(grown, free) - nothing
         if evidence > best and _is_clear(grown, drift, free):
             best, found = evidence, (drift, grown, free)
@@ -145,7 +147,7 @@ def _find_drift(
 def _evidence(solution: NuisanceSolution, nuisances: Sequence[Nuisance], prior: Array) -> dict[Nuisance, float]:
     """Return by how much each cause alone makes the pictures likelier [nats], its freedom penalised."""
     base = _log_likelihood(solution, prior)
-    return {n: _log_likelihood(solution, widen(prior, n)) - base for n in nuisances}
+    return {n: _log_likelihood(solution, allow_cause(prior, n)) - base for n in nuisances}
 
 
 def _log_likelihood(solution: NuisanceSolution, prior: Array) -> float:

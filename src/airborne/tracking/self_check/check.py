@@ -19,6 +19,7 @@ from airborne.tracking.self_check.empty_scenes import EmptyScenes
 from airborne.tracking.self_check.free_flight import excess, fall
 from airborne.tracking.self_check.light import register_light
 from airborne.tracking.self_check.nuisances import (
+    allow_cause,
     biases,
     first_bias,
     n_parameters,
@@ -26,7 +27,6 @@ from airborne.tracking.self_check.nuisances import (
     prior_covariance,
     shift_covariance,
     twists,
-    widen,
 )
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.tracking.self_check.registration import Silhouette, draw_silhouette, foreground, outline_of, register
@@ -129,7 +129,10 @@ def doubts(
     stayed: list[bool] = []
     if pairs:
         row, first = min(pairs, key=lambda pair: abs(pair[1].index - began))
-        stayed = [has_stayed(render_model, path.poses[row], path.poses[now], first, frames) for now, frames in pairs]
+        stayed = [
+            has_stayed(render_model, path.poses[row], path.poses[now], first=first, later=frames)
+            for now, frames in pairs
+        ]
     at = path.index[[row for row, _ in pairs]]
     none = np.zeros(len(path.index), bool)
     return {
@@ -168,7 +171,7 @@ def gather_equations(
         return None
     chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
     rows, moments = [seen[i][0] for i in chosen], [seen[i][1] for i in chosen]
-    evidence = _gather(RenderModel.of(model), rig, path, rows, moments, kept)
+    evidence = _gather(RenderModel.of(model), rig, path, rows, moments=moments, kept=kept)
     is_drawn = np.asarray(evidence.edge.any(axis=(1, 2, 3)))
     if not is_drawn.any():
         return None
@@ -176,11 +179,11 @@ def gather_equations(
     prior = prior_covariance(rig, body_sd, is_person=model.has_joints)
     wide = prior
     for nuisance in nuisances_of(rig):
-        wide = widen(wide, nuisance)
+        wide = allow_cause(wide, nuisance)
     solution, weights = solve(evidence, wide)
     errors = pose_errors(evidence, weights)
     if not model.has_joints:  # a person's centre of mass moves in the root; `find_wrong_fall` measures its fall
-        solution = _with_fall(solution, errors, rig, path, rows)
+        solution = _with_fall(solution, errors, rig, path, rows=rows)
     return RunEquations(rows, evidence, solution, errors, prior)
 
 
@@ -189,6 +192,7 @@ def _gather(
     rig: Rig,
     path: TrackedPath,
     rows: Sequence[int],
+    *,
     moments: Sequence[Frames],
     kept: Sequence[Frames],
 ) -> Evidence:
@@ -236,7 +240,7 @@ def _register(silhouette: Silhouette, rgb: Image, scene: Image, *, in_light: boo
 
 
 def _with_fall(
-    solution: NuisanceSolution, errors: PoseErrors, rig: Rig, path: TrackedPath, rows: Sequence[int]
+    solution: NuisanceSolution, errors: PoseErrors, rig: Rig, path: TrackedPath, *, rows: Sequence[int]
 ) -> NuisanceSolution:
     """Add what the fall says of the sizes, where the body falls freely.
 

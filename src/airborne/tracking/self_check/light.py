@@ -61,7 +61,7 @@ def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8]
     clip2 = _CLIP_MEDIANS**2 * max(min(float(np.median(each)) for each in squares), _LEAST_SQUARE)
     sigma = _BLURS_PX[int(np.argmin([np.sum(each / (clip2 + each)) for each in squares]))]
     for _ in range(_MOST_STEPS):
-        step = _step(*_linearise(silhouette, sides, offset, sigma, near, light, scene), clip2)
+        step = _step(*_linearise(silhouette, sides, offset, sigma, near=near, light=light, scene=scene), clip2)
         offset = offset + step
         if np.hypot(step[0], step[1]) < CONVERGED_PX:
             break
@@ -125,6 +125,7 @@ def _linearise(
     sides: list[NDArray[np.float32]],
     offset: Array,
     sigma: float,
+    *,
     near: tuple[Ints, Ints],
     light: NDArray[np.float32],
     scene: NDArray[np.float32],

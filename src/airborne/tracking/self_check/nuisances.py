@@ -146,7 +146,7 @@ def prior_covariance(rig: Rig, body_sd: float, *, is_person: bool) -> Array:
     return _about_middle(covariance if rig.states_errors else _without_common_motion(covariance, rig), rig)
 
 
-def widen(prior: Array, nuisance: Nuisance) -> Array:
+def allow_cause(prior: Array, nuisance: Nuisance) -> Array:
     """Return the prior with one cause possible that is not usual."""
     prior = prior.copy()
     columns = np.arange(nuisance.first, nuisance.first + nuisance.size)

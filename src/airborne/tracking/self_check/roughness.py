@@ -42,8 +42,8 @@ class PathFinding(NamedTuple):
 
 
 def find_wrong_path(path: TrackedPath, rough: Array) -> PathFinding | None:
-    """Find a thing that moves by jerks; `rough` (2,) is its `roughness`, by which its deviations are multiplied."""
-    share = _repeated_share(path)
+    """Find a thing that moves by jerks; `rough` (2,) is its roughness, by which its deviations are multiplied."""
+    share = _share_of_repeats(path)
     if share:
         return PathFinding(
             "repeated",
@@ -62,7 +62,7 @@ def find_wrong_path(path: TrackedPath, rough: Array) -> PathFinding | None:
     )
 
 
-def _repeated_share(path: TrackedPath) -> float:
+def _share_of_repeats(path: TrackedPath) -> float:
     """Return the share of steps that hardly are any, between two that are; 0 where they are few."""
     if len(path.index) < 4:
         return 0.0
@@ -76,7 +76,7 @@ def _repeated_share(path: TrackedPath) -> float:
     return share if n >= _FEWEST_REPEATED and share >= _LEAST_SHARE else 0.0
 
 
-def roughness(path: TrackedPath, is_tracked: NDArray[np.bool_]) -> Array:
+def measure_roughness(path: TrackedPath, is_tracked: NDArray[np.bool_]) -> Array:
     """Return by how much the errors of position and rotation exceed the stated ones: (2,) factors on them, 1 at least.
 
     is_tracked (n,): of the path's frames, others do not count. The middle of each window of tracked frames without a

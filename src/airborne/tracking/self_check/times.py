@@ -6,7 +6,7 @@ import numpy as np
 
 from airborne.cameras import Rig
 from airborne.tracking.self_check.check import RunEquations
-from airborne.tracking.self_check.nuisances import nuisances_of, widen
+from airborne.tracking.self_check.nuisances import allow_cause, nuisances_of
 from airborne.tracking.self_check.solution import N_BLOCKS
 from airborne.types import Array
 
@@ -24,7 +24,7 @@ def camera_times(run: RunEquations, rig: Rig) -> tuple[Array, Array] | None:
         return None
     prior = run.prior
     for nuisance in nuisances_of(rig):
-        prior = widen(prior, nuisance) if nuisance.kind == "time_s" else prior
+        prior = allow_cause(prior, nuisance) if nuisance.kind == "time_s" else prior
     columns = np.array([nuisance.first for nuisance in nuisances_of(rig) if nuisance.kind == "time_s"])
     difference = np.eye(len(columns)) - np.eye(len(columns))[0]
     theta, covariance, _ = run.solution.posterior(prior)
