@@ -6,7 +6,7 @@ import pytest
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of
 from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator
-from airborne.tracking.model_based.image_views import prepare_views
+from airborne.tracking.model_based.image_views import make_image_views
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.mask_faults import find_mask_faults
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
@@ -80,7 +80,7 @@ def test_fit_in_which_no_limb_moves_is_looked_through_once(frame, monkeypatch):
 
 def views_that_show(frame, pose):
     regions, _ = frame.views(pose)
-    views = prepare_views(frame.render_model, regions, frame.appearance)
+    views = make_image_views(frame.render_model, regions, frame.appearance)
     evaluate, _ = image_evaluator(frame.render_model, [pose], views, dofs=all_joints(HUMAN))
     return count_views(frame.render_model, pose, views, evaluate(pose, True).noise_of_views)
 

@@ -164,7 +164,7 @@ class Fitter:
 
     def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
         bodies = [self.render_model.with_pose(pose) for pose in poses]
-        return learned.prepare_views(self.render_model, bodies, are_narrow=not self.moves_joints)
+        return learned.make_image_views(self.render_model, bodies, are_narrow=not self.moves_joints)
 
     def _refit_limbs(
         self,

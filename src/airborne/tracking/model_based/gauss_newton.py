@@ -16,7 +16,7 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
 from airborne.tracking.model_based.blur import gaussian_taps
 from airborne.tracking.model_based.degrees_of_freedom import DegreesOfFreedom, PosePrior
-from airborne.tracking.model_based.image_views import NOISE_PX, ImageView, prepare_views
+from airborne.tracking.model_based.image_views import NOISE_PX, ImageView, make_image_views
 from airborne.tracking.model_based.kernel_arguments import Comparison
 from airborne.tracking.model_based.normal_equations import (
     MASK,
@@ -173,7 +173,7 @@ def linearise_images(
     render_model: RenderModel, pose: Pose, regions: Sequence[Region], appearance: Appearance, *, dofs: DegreesOfFreedom
 ) -> PoseEquations:
     """Return the normal equations of the images at one pose, without moving it."""
-    evaluate, _ = image_evaluator(render_model, [pose], prepare_views(render_model, regions, appearance), dofs=dofs)
+    evaluate, _ = image_evaluator(render_model, [pose], make_image_views(render_model, regions, appearance), dofs=dofs)
     return evaluate(pose, True)
 
 

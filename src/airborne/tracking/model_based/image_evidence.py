@@ -17,7 +17,7 @@ from airborne.body import BodyModel, Pose
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints, linearise_prior
 from airborne.tracking.model_based.gauss_newton import image_evaluator
-from airborne.tracking.model_based.image_views import prepare_views
+from airborne.tracking.model_based.image_views import make_image_views
 from airborne.tracking.model_based.later_frames import MARGIN_PX
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
@@ -62,7 +62,7 @@ def linearise_evidence(
     regions = crop_regions([posed], render_model.geometry, frames, MARGIN_PX, appearance)
     regions = [region for region in regions if appearance.has_colours(region)]
     appearance = learn_missing_backgrounds(render_model, posed, regions, appearance)
-    views = prepare_views(render_model, regions, appearance)
+    views = make_image_views(render_model, regions, appearance)
     images = image_evaluator(render_model, [pose], views, dofs=dofs)[0](pose, True)
     possible = linearise_prior(dofs, pose, PosePrior(pose, np.full(len(dofs.columns), np.inf)))
     misfit = max(images.misfit, 1e-9) if misfit is None else misfit

@@ -36,7 +36,7 @@ class ImageView(NamedTuple):
         return self._replace(buffers=self.buffers._replace(light=own))
 
 
-def prepare_views(render_model: RenderModel, regions: Sequence[Region], appearance: Appearance) -> list[ImageView]:
+def make_image_views(render_model: RenderModel, regions: Sequence[Region], appearance: Appearance) -> list[ImageView]:
     """Prepare the images of regions."""
     clip = _CLIP if render_model.lights is None else _CLIP_LIT
     views = []

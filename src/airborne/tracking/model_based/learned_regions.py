@@ -12,7 +12,7 @@ from airborne.rendering import EvidenceMaps
 from airborne.tracking.image_regions import narrow_regions
 from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.global_search import region_evidence
-from airborne.tracking.model_based.image_views import ImageView, prepare_views
+from airborne.tracking.model_based.image_views import ImageView, make_image_views
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.types import Array
@@ -45,7 +45,7 @@ class LearnedRegions:
         """Each pixel's evidence for the body, for the searches of limbs."""
         return region_evidence(*self.views)
 
-    def prepare_views(
+    def make_image_views(
         self, render_model: RenderModel, bodies: Sequence[PosedBody], *, are_narrow: bool
     ) -> list[ImageView]:
         """Prepare the images for a fit that starts from several poses, with a background in every region.
@@ -55,9 +55,9 @@ class LearnedRegions:
         regions = self.masks.regions
         appearance = learn_missing_backgrounds(render_model, bodies[0], regions, self.appearance)
         if are_narrow:
-            return prepare_views(
+            return make_image_views(
                 render_model, narrow_regions(regions, bodies, render_model.geometry, MARGIN_PX), appearance
             )
         if appearance not in self.prepared:
-            self.prepared[appearance] = prepare_views(render_model, regions, appearance)
+            self.prepared[appearance] = make_image_views(render_model, regions, appearance)
         return [view.with_own_light() for view in self.prepared[appearance]]

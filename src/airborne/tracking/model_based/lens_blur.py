@@ -17,7 +17,7 @@ from airborne.body import Pose
 from airborne.tracking.image_regions import narrow_regions
 from airborne.tracking.model_based.exposure import Extrapolation, still_images
 from airborne.tracking.model_based.gauss_newton import weigh_image
-from airborne.tracking.model_based.image_views import ImageView, prepare_views, with_lens_blur
+from airborne.tracking.model_based.image_views import ImageView, make_image_views, with_lens_blur
 from airborne.tracking.model_based.learned_regions import MARGIN_PX
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
@@ -39,7 +39,7 @@ def learn_blurs(
     for region in narrow_regions(regions, [posed], render_model.geometry, MARGIN_PX):
         if region.view.exposure_s and motion is None:
             continue
-        (image,) = prepare_views(render_model, [region], known)
+        (image,) = make_image_views(render_model, [region], known)
         if motion is not None and region.view.exposure_s:
             weigh_image(render_model, posed, image)  # fits its light
             (image,) = still_images(render_model, [image], pose, motion) or [image]
