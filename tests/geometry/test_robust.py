@@ -1,8 +1,20 @@
-"""How much numbers scatter."""
+"""Where the middle of numbers is, and how much they scatter."""
+
+import warnings
 
 import numpy as np
 
-from airborne.geometry.robust import covariance_of_sum, robust_sd
+from airborne.geometry.robust import covariance_of_sum, known_median, robust_sd
+
+
+def test_a_known_median_is_that_of_what_is_not_nan():
+    rng = np.random.default_rng(0)
+    values = rng.random((9, 4, 50)).astype(np.float32)
+    values[rng.random(values.shape) < 0.5] = np.nan
+    values[1:, 0, 0] = values[:, 0, 1] = np.nan
+    values[0, 0, 0] = 0.3
+    with warnings.catch_warnings(action="ignore"):  # that nothing is known of one
+        np.testing.assert_array_equal(known_median(values), np.nanmedian(values, axis=0))
 
 
 def test_robust_sd_is_that_of_normal_noise_however_far_outliers_are():

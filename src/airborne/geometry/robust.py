@@ -1,4 +1,4 @@
-"""Robust scatter: standard deviations despite outliers, covariances of sums of correlated terms. Arrays only."""
+"""Medians, standard deviations despite outliers, covariances of sums of correlated terms. Arrays only."""
 
 from __future__ import annotations
 
@@ -12,6 +12,17 @@ SD_OF_MEDIAN_DEVIATION = 1.4826  # of normal noise: 1 / 0.67449, its 75 % quanti
 def robust_sd(values: Array) -> float:
     """Return the standard deviation of normal noise with outliers in it, from the median absolute deviation."""
     return SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(values - np.median(values))))
+
+
+def known_median(values: Array) -> Array:
+    """Return the median over the first axis of what is not NaN; NaN where nothing is.
+
+    As `np.nanmedian`, which takes twenty times as long where rows are few and columns many.
+    """
+    n_known = np.sum(~np.isnan(values), axis=0)[None]
+    ordered = np.sort(values, axis=0)  # NaN last
+    low, high = (np.take_along_axis(ordered, middle, axis=0)[0] for middle in ((n_known - 1) // 2, n_known // 2))
+    return (low + high) / 2
 
 
 def covariance_of_sum(terms: Array, reach: int) -> Array:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from airborne.appearance.lighting import shade_body
 from airborne.body.shaping import length_axis
+from airborne.geometry.robust import known_median
 from airborne.rendering.shapes import new_shapes
 from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.render_model import RenderModel
@@ -87,5 +88,5 @@ def with_texture(render_model: RenderModel, colours: Sequence[Array]) -> RenderM
     albedo = render_model.albedo.copy()
     stack = np.array(colours, np.float32).reshape(-1, *albedo.shape)
     is_seen = np.isfinite(stack[..., 0]).sum(axis=0) >= _FEWEST_IMAGES
-    albedo[is_seen] = np.clip(np.nanmedian(stack[:, is_seen], axis=0), 1e-4, 1.5)
+    albedo[is_seen] = np.clip(known_median(stack[:, is_seen]), 1e-4, 1.5)
     return replace(render_model, albedo=albedo)
