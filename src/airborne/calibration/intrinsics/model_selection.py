@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ _N_PARTS = 25  # of an image, for the jackknife
 _COORDINATES_PER_PARAMETER = 3  # of a wide lens, at least: fewer points would bend it to their noise
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Solution:
     """One camera fitted to all its points, and once more without each of them."""
 
@@ -35,7 +36,7 @@ class Solution:
     world: Array  # (n, 3) [m]
     px: Array  # (n, 2) [px]
 
-    @property
+    @cached_property
     def residual_px(self) -> Array:
         """Measured minus projected pixels (n, 2) [px]."""
         return self.px - self.pinhole.px_from_world(self.world)
@@ -46,7 +47,7 @@ class Solution:
         n, p = 2 * len(self.world), self.model.n_parameters
         return float(np.sqrt(np.sum(self.residual_px**2) / max(n - p, 1) * p / n))
 
-    @property
+    @cached_property
     def held_out_px(self) -> Array:
         """The same for the camera fitted without the point (n, 2) [px]."""
         return self.px - np.array([p.px_from_world(x) for p, x in zip(self.refits, self.world, strict=True)])

@@ -31,24 +31,27 @@ def refit_pinholes(
     parameters = np.zeros((n_fits, 18))
     parameters[:, 3:10] = [*start.centre, start.focal_px, start.focal_px, *start.principal_point]
     parameters[:, 10 : 10 + len(start.terms)] = start.terms
-    R, damping = np.broadcast_to(start.R, (n_fits, 3, 3)), np.full(n_fits, _FIRST_DAMPING)
-    residual, J = _linearise(R, parameters, own, world, px=px, kept=kept, is_fisheye=start.lens == "fisheye")
-    is_open = np.ones(n_fits, bool)
+    R, damping = np.tile(start.R, (n_fits, 1, 1)), np.full(n_fits, _FIRST_DAMPING)
+    is_fisheye, open_fits = start.lens == "fisheye", np.arange(n_fits)
+    residual, J = _linearise(R, parameters, own, world, px=px, kept=kept, is_fisheye=is_fisheye)
     for _ in range(_MOST_ITERATIONS):
-        step, predicted = _levenberg_step(residual, J, damping)
-        cost = np.sum(residual**2, axis=1)
-        is_open &= predicted > _CONVERGED * cost
-        if not is_open.any():
+        step, predicted = _levenberg_step(residual[open_fits], J[open_fits], damping[open_fits])
+        cost = np.sum(residual[open_fits] ** 2, axis=1)
+        goes_on = predicted > _CONVERGED * cost
+        open_fits, step, cost = open_fits[goes_on], step[goes_on], cost[goes_on]
+        if not len(open_fits):
             break
-        new = parameters.copy()
+        new = parameters[open_fits]
         new[:, own] += step
         new[:, 7] = new[:, 6]  # square pixels
-        new_R = Rotation.from_rotvec(step[:, :3]).as_matrix() @ R
-        new_residual, new_J = _linearise(new_R, new, own, world, px=px, kept=kept, is_fisheye=start.lens == "fisheye")
-        gains = is_open & (np.sum(new_residual**2, axis=1) < cost)  # False where a point came behind the camera
-        parameters, R = np.where(gains[:, None], new, parameters), np.where(gains[:, None, None], new_R, R)
-        residual, J = np.where(gains[:, None], new_residual, residual), np.where(gains[:, None, None], new_J, J)
-        damping = np.where(gains, damping / _DAMPING_FACTOR, damping * _DAMPING_FACTOR)
+        new_R = Rotation.from_rotvec(step[:, :3]).as_matrix() @ R[open_fits]
+        found = _linearise(new_R, new, own, world, px=px, kept=kept[open_fits], is_fisheye=is_fisheye)
+        gains = np.sum(found[0] ** 2, axis=1) < cost  # False where a point came behind the camera
+        better = open_fits[gains]
+        parameters[better], R[better] = new[gains], new_R[gains]
+        residual[better], J[better] = (each[gains] for each in found)
+        now = damping[open_fits]
+        damping[open_fits] = np.where(gains, now / _DAMPING_FACTOR, now * _DAMPING_FACTOR)
     return [
         Pinhole(rotation, each[3:6], float(each[6]), each[8:10], each[10 : 10 + len(start.terms)], start.lens)
         for rotation, each in zip(R, parameters, strict=True)
