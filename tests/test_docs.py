@@ -135,7 +135,7 @@ def test_every_command_has_a_page_of_help_with_an_example_that_exists(name):
 
 def test_help_shows_square_brackets():
     text = CliRunner().invoke(app, ["track", "--help"]).output
-    assert "what changed [[key]] and [[mask]] tables touch" in " ".join(text.replace("│", " ").split())
+    assert "frames that new or changed [[key]] and [[mask]] tables touch" in " ".join(text.replace("│", " ").split())
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -178,7 +178,7 @@ def test_the_study_holds_no_outputs():
         (lambda: ab.read_rig(THROWN_CROSS / "control_points.csv"), "in Python calibrate with it"),
         (lambda: ab.read_rig("calib.toml")["cam1"].px_from_world([0, 1]), "expected (..., 3)"),
         (lambda: ab.read_rig("calib.toml").points_from_px([0, 1]), "expected (..., 3, 2), a row a camera"),
-        (lambda: ab.read_trial("trial.toml", stopp=3), "stopp = 3: track.stopp: unknown key; did you mean stop?"),
+        (lambda: ab.read_trial("trial.toml", stopp=3), "stopp = 3: unknown key; did you mean stop?"),
         (lambda: ab.evaluate("results"), "give truth, digitised, joints"),
         (lambda: ab.synthesise("cross", "p", seed=-1), "seed is -1; expected a whole number, 0 or more"),
         (lambda: ab.synthesise("cross", "p", seed="a"), "seed is 'a'; expected a whole number"),

@@ -95,6 +95,8 @@ def require_choice(value: str, choices: Collection[str], what: str) -> None:
 
 
 _PLAIN = {
+    "model_type": "expected a table",
+    "dict_type": "expected a table",
     "extra_forbidden": "unknown key",
     "float_parsing": "expected a number",
     "float_type": "expected a number",

@@ -58,7 +58,7 @@ def test_a_tables_columns_are_labels_over_those_of_the_file(tmp_path):
         ("Trial,condition\nx,wet\n", "columns Trial, condition; .* write trial instead of 'Trial'"),
         ("trial,condition\nx\n", "row 2: 1 cells, expected 2"),
         ("trial\nx\na/x\n", "two trials are called x"),
-        ("trial\n", "no trial is there"),
+        ("trial\n", "no trial found there"),
         ("trial,status\nx,good\n", "a label is called status"),
         ("trial,\nx,good\n", "a name has 1 to 80 characters"),
         (f"trial,{'a' * 90}\nx,good\n", "a name has 1 to 80 characters"),

@@ -59,7 +59,7 @@ def test_one_point_that_spoils_a_fit_of_least_squares_is_a_reason(tmp_path):
         ("points.csv", "is what the cameras are calibrated from"),
         ("notes.txt", "give a name that ends with .toml"),
         ("none/calib.toml", "there is no folder"),
-        ("trial.toml", "is there and is no calibration"),
+        ("trial.toml", "exists and is not a calibration"),
     ],
 )
 def test_no_other_file_is_written_over(tmp_path, monkeypatch, capsys, output, said):
@@ -170,7 +170,7 @@ def test_points_of_other_cameras_end_with_exit_code_1_and_another_file(tmp_path,
         cli.main()
     *rejection, result = said
     assert all(text.startswith("airborne: ") for text in rejection)
-    assert "no calibration to measure with" in rejection[-1]
+    assert "do not measure with this calibration" in rejection[-1]
     assert result.startswith("camera ")
     assert not (tmp_path / "c.toml").exists()
     assert stopped.value.code == 1 and (tmp_path / "c.rejected.toml").exists(), capsys.readouterr().err

@@ -17,5 +17,5 @@ def test_it_is_said_before_any_number(tmp_path):
     assert lines[2] == "no frame was tracked, so none of these numbers can be relied on"
     single = {"n_frames": 1, "n_uncertain": 1, "n_lost": 0, "doubts": {"position": 1}}
     one = _describe({**SUMMARY, **single}, tmp_path).splitlines()
-    assert one[2] == "one frame does not show what else looks like the body, so that it is often uncertain"
+    assert one[2] == "one frame alone does not show what else looks like the body, so it is often uncertain"
     assert not any("relied on" in line for line in _describe({**SUMMARY, "n_tracked": 1}, tmp_path).splitlines())

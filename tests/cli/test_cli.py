@@ -250,9 +250,10 @@ def test_a_demo_that_is_stopped_goes_on_by_the_same_command(short_run, tmp_path,
     monkeypatch.setattr("airborne.run.folder.holds_run_of", lambda trial, folder: True)
     for name in ("report.html", "summary.json"):
         assert in_process("demo", "-o", folder) == 130
-        assert capsys.readouterr().err.endswith(f"kept in {folder}; the same command goes on\n")
+        assert capsys.readouterr().err.endswith(f"no frame was tracked yet; {folder} still holds the run before\n")
         (folder / name).unlink(missing_ok=True)
     assert in_process("demo", "-o", folder) == 130
+    assert capsys.readouterr().err.endswith(f"kept in {folder}; the same command goes on\n")
     assert given == [(False, True), (False, True), (True, False)]
 
 
@@ -262,4 +263,16 @@ def test_a_stop_before_the_first_frame_leaves_nothing(trial, tmp_path, capsys, m
 
     monkeypatch.setattr("airborne.run.track.track_trial", interrupted)
     assert in_process("track", trial, "-o", tmp_path / "run") == 130
-    assert capsys.readouterr() == ("", "airborne: stopped; no frame was tracked yet, and nothing is written\n")
+    assert capsys.readouterr() == ("", "airborne: stopped; no frame was tracked yet\n")
+
+
+def test_a_stop_while_a_library_is_loaded_is_a_stop(trial, tmp_path, capsys, monkeypatch):
+    def loading(*arguments, **options):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as stopped:
+            raise ImportError("initialization failed") from stopped
+
+    monkeypatch.setattr("airborne.run.check.check_trial", loading)
+    assert in_process("check", trial) == 130
+    assert capsys.readouterr().err.endswith("airborne: stopped\n")

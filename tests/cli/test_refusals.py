@@ -21,7 +21,7 @@ BROKEN_TRIALS = {  # what is replaced in trial.toml, and what the line says
         (CALIBRATED, 'file = "two.toml"'),
         "no camera 'cam3'; it has: cam1, cam2; say",
     ),
-    "folder as video": (("cam2.mp4", "."), "is no file; give a video, or read pipes and devices with --live"),
+    "folder as video": (("cam2.mp4", "."), "is not a file; give a video, or read pipes and devices with --live"),
     "no such calibration": ((CALIBRATED, 'file = "no.toml"'), "no.toml not found"),
     "start past the end": ((f"stop = {SHORT}", ""), "no frame 500"),
 }
@@ -64,7 +64,9 @@ def test_arguments_that_name_nothing_get_one_line(trial, tmp_path, capsys):
     assert "--cameras names no camera" in refusal(capsys, "track", trial, "-o", run, "--cameras", " , ")
     for kind in ("cross", "somersault", "block"):
         assert "--seed" in refusal(capsys, "synth", kind, "-o", run, "--seed", "-1")
-    assert "--method magic: " in refusal(capsys, "track", trial, "-o", run, "--method", "magic")
+    assert "--method magic: expected" in refusal(capsys, "track", trial, "-o", run, "--method", "magic")
+    assert "--overlay paper: not read" in refusal(capsys, "track", trial, "-o", run, "--overlay", "paper")
+    assert "holds no run" in refusal(capsys, "evaluate", tmp_path / "nowhere")
     assert not run.exists()
 
 

@@ -50,6 +50,14 @@ def test_a_shift_of_the_world_is_the_bias_and_goes_with_it():
     assert result.whole.mean_without_offset_mm > 0.1  # the segments turn under it
 
 
+def test_paths_of_another_recording_are_asked_about():
+    question = "are they of this recording?"
+    elsewhere = np.random.default_rng(3).uniform(-2, 2, (len(TIMES), len(MARKS), 3))
+    assert question in compare_joints(run(), MODEL, paths(error_m=elsewhere)).describe()
+    assert question not in compare_joints(run(), MODEL, paths(error_m=np.array([-3.0, 0.0, 4.0]))).describe()
+    assert question not in compare_joints(run(), MODEL, paths()).describe()
+
+
 def test_smoothed_joints_take_the_places_of_the_tracked_ones_and_their_deviations():
     off_m = np.array([0.003, 0.0, -0.004])
     smooth = paths(names=MARKS, error_m=off_m)

@@ -83,7 +83,7 @@ def test_yaml_that_is_not_flat_is_refused_in_one_line_and_soon(tmp_path, text, e
 def test_what_is_no_file_is_not_read(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", tmp_path, "/dev/zero", "/dev/null"):
-        with pytest.raises(OSError, match=r"it is (no file|a folder)"):
+        with pytest.raises(OSError, match=r"it is (not a file|a folder)"):
             read_bytes(Path(path), 1000)
     if os.path.exists("/proc/kmsg"):
         assert read_bytes(Path("/proc/kmsg"), 1000) == b""  # of 0 bytes, says the system; reading would wait for ever

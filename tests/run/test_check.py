@@ -289,9 +289,9 @@ def test_the_first_frame_is_drawn_and_then_replaced_by_the_whole_run(folder, tmp
     assert drawn <= set(files_of(out))
     assert not (out / "report.html").exists() and not (out / "videos").exists()
     (out / "notes.txt").write_text("mine")
+    assert track_trial(trial, out, pictures=False).summary["n_frames"] == 2
     with pytest.raises(ResultError, match="overwrite it"):
         track_trial(trial, out, pictures=False)
-    assert track_trial(trial, out, overwrite=True, pictures=False).summary["n_frames"] == 2
     assert not drawn & set(files_of(out))
     assert (out / "notes.txt").read_text() == "mine"
 

@@ -13,7 +13,7 @@ from airborne.cameras.skeletons import SKELETONS
 from airborne.errors import CalibrationError, MistakesError, TrialError
 from airborne.run import detections as trial_detections
 from airborne.run import first_pose
-from airborne.run.folder import input_hashes
+from airborne.run.identity import input_hashes
 from airborne.run.opening import open_cameras, open_trial, video_source
 from airborne.trial.file import read_trial
 from airborne.video import inspect

@@ -12,7 +12,7 @@ import trimesh
 from airborne.errors import ResultError, VideoError
 from airborne.io.folder_lock import LOCK, sole_writer
 from airborne.motion.smoothing.smoother import Smoothing
-from airborne.run.folder import input_hashes
+from airborne.run.identity import input_hashes
 from airborne.run.smooth import smooth_run
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
@@ -85,7 +85,7 @@ def test_ctrl_c_before_the_first_frame_promises_nothing(path, tmp_path, monkeypa
 
     monkeypatch.setattr("airborne.run.track.track_trial", interrupted)
     assert in_process("track", path, "-o", tmp_path / "run") == 130
-    assert capsys.readouterr().err == "airborne: stopped; no frame was tracked yet, and nothing is written\n"
+    assert capsys.readouterr().err == "airborne: stopped; no frame was tracked yet\n"
     assert not (tmp_path / "run").exists()
 
 

@@ -9,7 +9,7 @@ from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
 from airborne.io.folder_lock import sole_writer
-from airborne.run.folder import run_identity
+from airborne.run.identity import run_identity
 from airborne.studio.pages.body import describe_body
 from airborne.studio.project import find_trial, list_measurements, list_runs, read_project, steps
 from airborne.studio.run_names import check_run_name, next_run_name

@@ -121,10 +121,10 @@ def test_entries_of_the_track_table_can_be_replaced(folder):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"every": 0}, "every = 0: track.every: expected 1 or more"),
-        ({"method": "magic"}, "method = 'magic': track.method: expected 'refined', 'joint'"),
+        ({"every": 0}, "every = 0: expected 1 or more"),
+        ({"method": "magic"}, "method = 'magic': expected 'refined', 'joint'"),
         ({"method": "blocker"}, "method = 'blocker': track: method 'blocker' does not go with this body"),
-        ({"overlay": "paper"}, "overlay = 'paper': track: overlay: not read by method 'stepping'; remove it"),
+        ({"overlay": "paper"}, "overlay = 'paper': not read by method 'stepping'; remove it"),
     ],
 )
 def test_a_change_that_cannot_be_is_named_instead_of_the_file(folder, changes, said):
@@ -345,7 +345,7 @@ def test_value_where_a_table_belongs_is_refused(folder, wrong):
 
 
 def test_empty_missing_or_binary_file_is_refused(folder):
-    assert "no trial file, as [[camera]], [calibration], [body] are missing" in complaint(folder, "")
+    assert "not a trial file, as [[camera]], [calibration], [body] are missing" in complaint(folder, "")
     assert "(found segment)" in complaint(folder, "[[segment]]")
     with pytest.raises(TrialError, match=r"none\.toml: cannot be read \(No such file or directory\)"):
         read_trial(folder / "none.toml")

@@ -29,7 +29,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 
 def test_a_folder_is_no_video(tmp_path):
-    assert "is no file; give a video, or read pipes" in refusal(tmp_path)
+    assert "is not a file; give a video, or read pipes" in refusal(tmp_path)
 
 
 def test_an_empty_file_is_called_empty(tmp_path):

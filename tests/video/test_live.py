@@ -239,7 +239,7 @@ def test_waiting_for_images_is_reported_and_can_be_interrupted(tmp_path):
 @pytest.mark.parametrize(
     ("sources", "expected"),
     [
-        ([("cam1", "nowhere", "progressive")], "is no file, pipe or capture device"),
+        ([("cam1", "nowhere", "progressive")], "is not a file, pipe or capture device"),
         ([("cam1", "clip.mkv", "top-first")], "live images are read as whole frames"),
         ([("cam1", "pipe", "progressive"), ("cam2", "pipe", "progressive")], "two cameras read from"),
         ([("cam1", "text", "progressive")], "cannot be opened as a video"),

@@ -24,7 +24,7 @@ from airborne.export.pictures import thumbnail
 from airborne.io.text import read_json
 from airborne.io.writing import explain_full_disk
 from airborne.motion.run_folder import MOTION, REPORT, RUN_RECORD, SUMMARY, list_figures
-from airborne.run.folder import run_identity
+from airborne.run.identity import run_identity
 from airborne.run.track import track_trial
 from airborne.trial.file import Trial, read_trial
 

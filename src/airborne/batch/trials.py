@@ -50,7 +50,7 @@ def list_trials(what: str) -> list[BatchTrial]:
         rows = [(Path(name), {}) for name in sorted(glob.glob(what, recursive=True))]
     if not rows:
         raise AirborneError(
-            f"{what}: no trial is there; give a folder, a quoted pattern such as 'trials/*.toml', or a CSV"
+            f"{what}: no trial found there; give a folder, a quoted pattern such as 'trials/*.toml', or a CSV"
         )
     trials = [_describe(file, labels) for file, labels in rows]
     by_name: dict[str, Path] = {}

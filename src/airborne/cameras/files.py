@@ -120,7 +120,7 @@ def open_calibration(path: str | Path) -> CalibrationFile:
         content = f"as TOML, {_short(error)}" if path.suffix.lower() == ".toml" else f"it begins with {first!r}"
         is_points = {"point", "x_m"} <= set(text.strip().splitlines()[0].split(","))
         mend = f'; in a trial say control_points = "{path.name}", in Python calibrate with it' if is_points else ""
-        raise CalibrationError(f"{where} is no calibration ({content}); {_EXPECTED}{mend}") from None
+        raise CalibrationError(f"{where} is not a calibration ({content}); {_EXPECTED}{mend}") from None
     if isinstance(document.get("cameras"), dict):
         named = {f"cam_{key}": table for key, table in document["cameras"].items()}
         return CalibrationFile("caliscope", where, partial(rig_from_caliscope, document, where), _errors_px(named))

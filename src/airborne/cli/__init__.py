@@ -108,6 +108,10 @@ def main() -> None:
         _refuse_usage(error)
     except (KeyboardInterrupt, typer.Abort):
         stop()
+    except ImportError as error:  # some libraries in C turn a stop while they are loaded into one
+        if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise
+        stop()
     except UndecidedError as error:
         refuse(str(error), code=UNDECIDED)
     except AirborneError as error:

@@ -70,7 +70,7 @@ def batch_command(
 def new_command(
     videos: Annotated[Path, typer.Argument(help="The folder of the videos.")],
     *,
-    pattern: Annotated[str, typer.Option(help="How their paths below it are made; words in braces become labels.")],
+    pattern: Annotated[str, typer.Option(help="How the paths below it are built; words in braces become labels.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for session.toml and trials/.")],
     calibration: Annotated[
         str, typer.Option(help="The calibration, or a .csv of control points, from the output.")

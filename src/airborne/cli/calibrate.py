@@ -67,7 +67,7 @@ def calibrate_command(
     if not output.parent.is_dir():
         raise AirborneError(f"-o {missing_folder(output)}")
     if output.exists() and not _is_calibration(output):
-        raise AirborneError(f"-o {output} is there and is no calibration; give the result another name")
+        raise AirborneError(f"-o {output} exists and is not a calibration; give the result another name")
     for option, is_given in (("--fisheye", fisheye), ("--timestamps", timestamps is not None)):
         if is_given and board is None:
             raise AirborneError(f"{option} goes with --board; a file of sources says both for each camera or board")
@@ -230,7 +230,7 @@ def _from_sources(sources: Any, output: Path, folder: Path, as_json: bool) -> No
 def _print_result(text: str, written: Path, reasons: tuple[str, ...], *, as_json: bool) -> None:
     """Print a calibration; before it why it was rejected, and then end with exit code 1."""
     if reasons:
-        reasons = (*reasons, f"this is no calibration to measure with; to look at it: {written}")
+        reasons = (*reasons, f"do not measure with this calibration; to look at it: {written}")
     for reason in reasons:
         errors.print(f"airborne: {reason}", style="red", markup=False)
     print(text)

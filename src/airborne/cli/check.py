@@ -23,7 +23,7 @@ def check_command(
     Example: airborne check trial.toml
     """
     if errors.is_terminal:
-        errors.print("opening videos; what is well is listed first, then the mistakes and doubts", style="dim")
+        errors.print("opening videos; what is in order is listed first, then mistakes and doubts", style="dim")
     from airborne.run.check import check_trial
 
     checks = check_trial(trial, (lambda line: None) if as_json else partial(print, flush=True))
@@ -37,7 +37,7 @@ def check_command(
         for line in checks.doubts:
             errors.print(f"airborne: doubt: {line}", style="yellow", markup=False)
         if checks.mistakes and checks.well:
-            errors.print("the other checks run once these are mended", style="dim")
+            errors.print("the other checks run once these are corrected", style="dim")
         elif checks.doubts and not checks.mistakes:
             print(f"{count(len(checks.doubts), 'doubt')}: frames may come out uncertain or lost")
         elif not checks.mistakes:

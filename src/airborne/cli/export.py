@@ -20,7 +20,7 @@ def export_command(
     ] = None,
     c3d: Annotated[bool, typer.Option("--c3d", help="Markers for Visual3D, Vicon Nexus, Mokka, ...")] = False,
     trc: Annotated[bool, typer.Option("--trc", help="Markers for OpenSim.")] = False,
-    mot: Annotated[bool, typer.Option("--mot", help="Angles for OpenSim, to play with the model.")] = False,
+    mot: Annotated[bool, typer.Option("--mot", help="Angles for OpenSim, to animate the model with.")] = False,
     osim: Annotated[bool, typer.Option("--osim", help="The body as an OpenSim model.")] = False,
     gltf: Annotated[bool, typer.Option("--gltf", help="The moving body (.glb) for Blender, browsers, ...")] = False,
     bvh: Annotated[bool, typer.Option("--bvh", help="The moving skeleton for animation programs.")] = False,

@@ -28,7 +28,7 @@ def demo_command(
 ) -> None:
     """Track the bundled example, a thrown cross, and compare it with its truth.
 
-    An earlier demo's run is replaced, one that was stopped goes on.
+    An earlier demo's run is replaced; one that was stopped is resumed.
 
     Example: airborne demo
     """
@@ -62,7 +62,7 @@ def track_command(
     resume: Annotated[
         bool,
         typer.Option(
-            help="Resume a run that was stopped, or track again what changed [[key]] and [[mask]] tables touch."
+            help="Resume a stopped run; frames that new or changed [[key]] and [[mask]] tables touch are tracked again."
         ),
     ] = False,
     overwrite: Annotated[bool, typer.Option(help="Replace the run that the folder holds.")] = False,
@@ -72,7 +72,7 @@ def track_command(
     ] = False,
     take: Annotated[
         int | None,
-        typer.Option(min=1, help="Without [start]: which of the poses in candidates.json, where these are undecided."),
+        typer.Option(min=1, help="Without [start]: the number of the pose in candidates.json to start from."),
     ] = None,
     method: Annotated[
         str | None,
@@ -114,7 +114,8 @@ def track_command(
         if run.was_finished:
             print(f"{output} holds this run, finished; nothing was tracked again (--overwrite tracks it anew)")
         print(f"{_describe(run.summary, output)}\nresults: {_describe_results(output)}")
-    if not run.summary["n_tracked"]:
+    is_found = run.summary["n_tracked"] or (first_frame and run.summary.get("n_uncertain"))
+    if not is_found:
         raise typer.Exit(1)
 
 
@@ -135,6 +136,7 @@ def _track(
     names = None if cameras is None else [name.strip() for name in cameras.split(",") if name.strip()]
     if names == []:
         raise AirborneError("--cameras names no camera; give their names, separated by commas")
+    began_s = time.time()
     try:
         with Stages() as report:
             report("opening videos", 0, None)  # at once, as even loading the modules takes seconds
@@ -155,8 +157,11 @@ def _track(
                 stage_progress=report,
             )
     except KeyboardInterrupt:
-        if not any((output / table).is_file() for table in _FIRST_WRITTEN):
-            stop("no frame was tracked yet, and nothing is written")
+        written = [path for table in _FIRST_WRITTEN if (path := output / table).is_file()]
+        if not written:
+            stop("no frame was tracked yet")
+        if overwrite and written[0].stat().st_mtime < began_s:
+            stop(f"no frame was tracked yet; {output} still holds the run before")
         motion = output / _FIRST_WRITTEN[0]
         n = motion.read_text(encoding="utf-8").count("\n") - 1 if motion.is_file() else None  # below its header
         found = "what was found so far is" if n is None else f"{count(n, 'frame')} found so far, kept"
@@ -214,7 +219,7 @@ def _describe(summary: dict, output: Path) -> str:
         if summary["doubts"]:
             lines.append(f"uncertain: {describe_doubts(summary)}")
         if n == summary["n_uncertain"] == 1:
-            said = "one frame does not show what else looks like the body, so that it is often uncertain"
+            said = "one frame alone does not show what else looks like the body, so it is often uncertain"
             lines.append(f"{said}: {look}, where every outline must lie on the body" if look else said)
         elif not summary["n_tracked"]:
             lines.append("no frame was tracked, so none of these numbers can be relied on")
@@ -243,7 +248,7 @@ def fit_body_command(
         str | None, typer.Option(help="Whose points the detections are, if their files do not say: BODY_25, ...")
     ] = None,
 ) -> None:
-    """Fit the trial's body to the person in its videos: lengths, girths, colours and their borders.
+    """Fit the trial's body to the person in its videos: lengths, girths, colours and where they change.
 
     Example: airborne fit-body trial.toml -o person.toml
     """

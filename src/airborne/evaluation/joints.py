@@ -27,6 +27,8 @@ from airborne.types import Array, Triple
 
 _CLEARLY_BETTER = 0.98  # of the unshifted distance
 _FAR_M = 0.1  # a joint that far off is misplaced
+# [mm] mean distance, without constant offsets or a shift of the world, of paths of something else: no tracked person errs by a third of it
+_ELSEWHERE_MM = 300.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +95,8 @@ class JointComparison:
                 f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
                 f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?"
             )
+        elif min(self.whole.mean_without_offset_mm, self.whole.mean_without_bias_mm) > _ELSEWHERE_MM:
+            lines.append("the paths are nowhere near these joints: are they of this recording?")
         share = self.calibration
         if share.n:
             lines.append(

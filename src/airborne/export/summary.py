@@ -21,7 +21,7 @@ _REASONS = {
     Doubt.IMAGES: "images and pose agree too little",
     Doubt.POSITION: "a position has an sd over 50 mm",
     Doubt.VIEW: "much of the body is out of the pictures",
-    Doubt.LIMBS: "limbs may be misplaced, and nothing of the recording was learned before",
+    Doubt.LIMBS: "limbs may be misplaced, before anything was learned from this recording",
     Doubt.DIRECTIONS: "tracked forward and back in time the body was in different places",
     Doubt.SELF_CHECK: "the self-check doubts it",
 }

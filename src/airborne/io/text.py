@@ -34,7 +34,7 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     if stat.S_ISDIR(status.st_mode):
         raise OSError(errno.EISDIR, "it is a folder", str(path))
     if not stat.S_ISREG(status.st_mode):
-        raise OSError(errno.EINVAL, "it is no file", str(path))
+        raise OSError(errno.EINVAL, "it is not a file", str(path))
     if status.st_size > most_bytes:
         raise ValueError(f"larger than {most_bytes / 1e6:g} MB")
     if status.st_size == 0:  # as the system's own files say, some of which never end

@@ -24,7 +24,7 @@ def explain_full_disk(path: Path) -> Iterator[None]:
             raise
         free_mb = shutil.disk_usage(path if path.is_dir() else path.parent).free / 1e6
         raise ResultError(
-            f"{path} cannot be written ({error.strerror}): {free_mb:.0f} MB are free on its disk, or less is granted; "
+            f"{path} cannot be written ({error.strerror}): {free_mb:.0f} MB are free on its disk, or less by quota; "
             "make room and give the command again (track: with --resume)"
         ) from error
 

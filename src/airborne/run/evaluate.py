@@ -66,11 +66,11 @@ def assess(
     """
     if holds_players(folder):
         return _assess_players(folder, truth, is_alone=digitised is None and joints is None, keep=keep)
+    motion, model = read_body_run(folder)
     if truth is None and digitised is None and joints is None:
         raise ResultError(
             "nothing to compare with; give a truth.csv, --digitised, --joints, --joint-angles, or --repeat with a run"
         )
-    motion, model = read_body_run(folder)
     if not motion.has_pose.any():
         raise ResultError(f"{folder}: the body was found in no frame, so there is nothing to compare; track again")
     symmetry = symmetries(model)

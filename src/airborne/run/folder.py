@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import shutil
@@ -11,12 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airborne import __version__
-from airborne.body.files import find_mesh_files
-from airborne.cameras.files import files_beside
 from airborne.errors import ResultError, RunThereError
 from airborne.export import write_json
-from airborne.io.files import file_digest
 from airborne.io.folder_lock import LOCK, refuse_links, sole_writer
 from airborne.motion import drop_rows
 from airborne.motion.covariance_file import COVARIANCE_FILE, LASTING_FILE
@@ -43,9 +38,9 @@ from airborne.motion.run_folder import (
     VIDEOS,
     read_record,
 )
+from airborne.run.identity import START, corrections_by_frame, is_first_frame_alone, run_identity
 from airborne.trial.file import Trial
 
-START = "start"  # stands for the digest of the first key, which other digests hold
 _BEFORE_A_RUN = {CANDIDATES, CANDIDATES_PICTURE}  # what a start that is undecided leaves
 
 
@@ -62,7 +57,8 @@ def prepare_folder(
 ) -> bool:
     """Prepare a run's folder; return whether it holds rows of its `table` from which to resume.
 
-    Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not.
+    Whoever calls it is the folder's `sole_writer`. `overwrite` removes the run that the folder holds, finished or not;
+    one of the first frame alone goes without being asked.
     A run of one body that differs in keys and masks alone loses the rows that these touch, which are then tracked
     again. What was made of another motion than the last goes: report, pictures, smoothed tables, comparisons. Raises
     ResultError for a folder that holds something else, a run with neither `resume` nor `overwrite`, or a run of other
@@ -73,8 +69,7 @@ def prepare_folder(
     if not record.exists() and not rows.exists() and foreign:
         raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
     refuse_links(folder)
-    if overwrite and record.exists():
-        read_record(record)
+    if record.exists() and (overwrite or (is_first_frame_alone(read_record(record)) and not resume)):
         _remove_run(folder)
     if rows.exists() and not resume:
         raise RunThereError(
@@ -203,18 +198,6 @@ def read_choice(folder: Path) -> int | None:
     return read_record(record).get("take") if record.is_file() else None
 
 
-def run_identity(trial: Trial, *, live: bool = False, take: int | None = None) -> dict[str, Any]:
-    """Return what two runs share if one can resume the other; `take` is which of the poses found was chosen."""
-    settings = {
-        "inputs": input_hashes(trial, live=live),
-        **_corrections(trial),
-        "settings": trial.track.model_dump(),
-        "version": __version__,
-        **({} if take is None else {"take": take}),
-    }
-    return json.loads(json.dumps(settings))
-
-
 class PendingCorrections(NamedTuple):
     """The corrections of a trial that are others than those its run was tracked with."""
 
@@ -227,7 +210,7 @@ def pending_corrections(trial: Trial, folder: Path) -> PendingCorrections:
     """Return the corrections that a trial got since its run in a folder was tracked; none without a record."""
     if not (folder / RUN_RECORD).is_file():
         return PendingCorrections([], [], [])
-    now = json.loads(json.dumps(_corrections(trial)))
+    now = json.loads(json.dumps(corrections_by_frame(trial)))
     recorded = _with_keys(read_record(folder / RUN_RECORD), now)
     if trial.start.find:  # as it was found then
         found = {frame: digest for frame, digest in recorded["keys"].items() if digest == START}
@@ -235,61 +218,6 @@ def pending_corrections(trial: Trial, folder: Path) -> PendingCorrections:
     old, new = recorded["keys"], now["keys"]
     keys = sorted(int(frame) for frame in {*old, *new} if old.get(frame) != new.get(frame))
     return PendingCorrections(keys, _mask_changes(recorded, now), stretches_between(recorded, now))
-
-
-def _corrections(trial: Trial) -> dict[str, Any]:
-    return {"keys": _key_digests(trial), "masks": [mask.model_dump() for mask in trial.mask]}
-
-
-def _key_digests(trial: Trial) -> dict[str, str]:
-    """Return a digest of each key and its files, by its frame; the start, which other digests hold, is the first."""
-    digests = {str(trial.start.frame): START}
-    for key in trial.key:
-        files = {name: file_digest(trial.path(name)) for name in key.source_files}
-        said = json.dumps([key.model_dump(), files])
-        digests[str(key.frame)] = hashlib.sha256(said.encode()).hexdigest()
-    return digests
-
-
-def input_hashes(trial: Trial, *, live: bool = False) -> dict[str, str]:
-    """Return the SHA-256 of each input file, by the name that the trial gives it, and of tables that it holds itself.
-
-    Live video has none.
-    """
-    names = [*(camera.video for camera in trial.camera if not live), *trial.input_files, *_further_files(trial)]
-    return {name: file_digest(trial.path(name)) for name in names} | _table_digests(trial)
-
-
-def find_changed_tables(trial: Trial, folder: Path) -> list[str]:
-    """Return which of a trial's [start], [lights], [calibration], [body], [[camera]] changed since its run in a folder.
-
-    Not of what lies in files; nor of a start that is found, as the run holds it as it was found.
-    """
-    record = folder / RUN_RECORD
-    inputs = read_record(record).get("inputs") if record.is_file() else None
-    recorded = inputs if isinstance(inputs, dict) else {}
-    digests = _table_digests(trial).items()
-    changed = [name for name, digest in digests if recorded.get(name, digest) != digest]
-    return [name for name in changed if not (trial.start.find and name == "[start]")]
-
-
-def _table_digests(trial: Trial) -> dict[str, str]:
-    tables = {
-        "[start]": trial.start.model_dump(),
-        "[lights]": trial.lights and trial.lights.model_dump(),
-        "[calibration]": trial.calibration.model_dump(),
-        "[body]": trial.body.model_dump(),
-        "[[camera]]": [camera.model_dump() for camera in trial.camera],
-    }
-    return {name: hashlib.sha256(json.dumps(table).encode()).hexdigest() for name, table in tables.items()}
-
-
-def _further_files(trial: Trial) -> list[str]:
-    """Return what the named files name in turn: a body's meshes, the other half of a calibration in two files."""
-    body, calibration = trial.body.file, trial.calibration.file
-    meshes = [] if body is None else [str(Path(body).parent / name) for name in find_mesh_files(trial.path(body))]
-    halves = [] if calibration is None else [path.name for path in files_beside(trial.path(calibration))]
-    return meshes + [str(Path(calibration or "").parent / name) for name in halves]
 
 
 def list_tables(folder: Path) -> list[str]:

@@ -28,7 +28,8 @@ from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
 from airborne.run.find import FoundStart, find_start
 from airborne.run.find_players import FoundPlayers, find_players_start
-from airborne.run.folder import is_finished, list_tables, prepare_folder, read_choice, run_identity
+from airborne.run.folder import is_finished, list_tables, prepare_folder, read_choice
+from airborne.run.identity import run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, dark_start_error, open_live, open_trial, past_the_end_error
 from airborne.run.players import PlayersRun

@@ -15,7 +15,7 @@ from airborne.body.files import read_body
 from airborne.errors import AirborneError, TrialError, one_line
 from airborne.io.folder_lock import find_writer
 from airborne.motion.run_folder import JOINTS, MOTION, REPORT, SUMMARY
-from airborne.run.folder import find_changed_tables
+from airborne.run.identity import find_changed_tables
 from airborne.studio.clicks import count_clicked, read_clicked
 from airborne.studio.folder import files_inside, outer_links, path_inside, readable_files
 from airborne.studio.named_files import read_inner_tables, refuse_outer_meshes

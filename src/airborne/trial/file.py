@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Sequence
 from itertools import chain
@@ -251,10 +252,9 @@ def read_trial(
 
 def _validate(table: dict[str, Any], changes: dict[str, Any], where: str, given_as: str) -> Trial:
     """Return the trial of a table with changes to its settings; an error names the changes where they cause it."""
-    heads = ("[[camera]]", "[calibration]", "[body]")
-    missing = [head for head in heads if head.strip("[]") not in table]
+    missing = [head for head in ("[[camera]]", "[calibration]", "[body]") if head.strip("[]") not in table]
     if len(missing) > 1:
-        raise TrialError(f"{where}: no trial file, as {', '.join(missing)} are missing (found {list_keys(table)})")
+        raise TrialError(f"{where}: not a trial file, as {', '.join(missing)} are missing (found {list_keys(table)})")
     settings = table.get("track", {})
     changed = {**table, "track": {**settings, **changes} if isinstance(settings, dict) else settings}
     try:
@@ -266,8 +266,9 @@ def _validate(table: dict[str, Any], changes: dict[str, Any], where: str, given_
             Trial(**table)
             where = " ".join(given_as.format(name, value) for name, value in changes.items())
         except MistakesError:
-            pass
-    raise MistakesError(where, found.plain, found.places)
+            changes = {}
+    said = rf"^track(\.|: )({'|'.join(map(re.escape, changes))}): "  # where it stands in the file, as its name is said
+    raise MistakesError(where, [re.sub(said, "", each) if changes else each for each in found.plain], found.places)
 
 
 def list_wrong_names(trial: Trial) -> list[str]:

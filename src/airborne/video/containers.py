@@ -35,7 +35,7 @@ def open_file(name: str, path: Path | str) -> InputContainer:
     if not path.exists():
         raise VideoError(f"{name}: video {path} not found; check its path")
     if not path.is_file():
-        raise VideoError(f"{name}: {path} is no file; give a video, or read pipes and devices with --live")
+        raise VideoError(f"{name}: {path} is not a file; give a video, or read pipes and devices with --live")
     if path.stat().st_size == 0:
         raise VideoError(f"{name}: {path} is empty (0 bytes); copy it again")
     try:

@@ -37,7 +37,7 @@ def kind_of(source: VideoSource) -> SourceKind:
         return "device"
     if path.is_file():
         return "file"
-    raise VideoError(f"{source.name}: {path} is no file, pipe or capture device; check its path")
+    raise VideoError(f"{source.name}: {path} is not a file, pipe or capture device; check its path")
 
 
 def is_stdin(source: VideoSource) -> bool:

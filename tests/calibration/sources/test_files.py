@@ -67,7 +67,7 @@ def test_another_kind_of_file_is_reported(tmp_path):
     path = tmp_path / "sources.toml"
     for text, found in (("[cam1]\nmatrix = 1", "cam1"), ('name = "x"\n[[camera]]\n[body]', "name, camera, body")):
         path.write_text(text)
-        with pytest.raises(CalibrationError, match=rf"is no file of sources: expected .* \(found {found}\)"):
+        with pytest.raises(CalibrationError, match=rf"is not a sources file: expected .* \(found {found}\)"):
             read_sources(path)
 
 

@@ -194,7 +194,7 @@ def sources_from(document: dict, folder: Path, where: str) -> Sources:
     """Check the tables; relative paths count from the folder. Raises CalibrationError, naming `where`."""
     if "camera" not in document or "body" in document:
         raise CalibrationError(
-            f"{where} is no file of sources: expected [[camera]] and [board], [control_points], [court], [wand] or "
+            f"{where} is not a sources file: expected [[camera]] and [board], [control_points], [court], [wand] or "
             f"[detections] (found {list_keys(document)})"
         )
     try:
