@@ -27,7 +27,8 @@ from airborne.types import Array, Triple
 
 _CLEARLY_BETTER = 0.98  # of the unshifted distance
 _FAR_M = 0.1  # a joint that far off is misplaced
-# [mm] mean distance, without constant offsets or a shift of the world, of paths of something else: no tracked person errs by a third of it
+# [mm] mean distance of paths of something else, without constant offsets or a shift of the world: no tracked person
+# errs by a third of it
 _ELSEWHERE_MM = 300.0
 
 

@@ -143,11 +143,14 @@ def _open_for_look(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
 
 
 def _report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
-    """Yield the frames, and report how many were."""
+    """Yield the frames, and report how many were; after the last, that how much is left is unknown."""
+    number = 0
     for number, frames in enumerate(recording, start=1):
         if progress is not None:
             progress(number, recording.n_frames)
         yield frames
+    if progress is not None:
+        progress(number, None)
 
 
 def take_candidate(trial: Trial, finding: AnySearch, number: int) -> AnySearch:
