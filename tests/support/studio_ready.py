@@ -24,5 +24,5 @@ for name in (*SERVING, *TRACKING):
     import_module(name)
 for name in PARTS:
     import_module(f"nicegui.elements.{name}")
-swing_twist_from_matrix(np.eye(3)[None])  # what Numba loads at its first kernel takes half a second
+swing_twist_from_matrix(np.eye(3)[None])  # the first kernel loads more than the next ones
 gc.freeze()
