@@ -81,7 +81,8 @@ def test_a_damaged_record_of_a_run_is_not_guessed(trial, short_run, tmp_path, ca
     run = tmp_path / "run"
     shutil.copytree(short_run, run)
     (run / "run.json").write_text("{")
-    assert "run.json is damaged" in refusal(capsys, "track", trial, "-o", run, "--resume")
+    for option in ("--resume", "--overwrite"):
+        assert "run.json is damaged" in refusal(capsys, "track", trial, "-o", run, option)
     (run / "run.json").unlink()
     assert "run.json is missing" in refusal(capsys, "track", trial, "-o", run, "--resume")
     assert (run / "motion.csv").read_bytes() == (short_run / "motion.csv").read_bytes()

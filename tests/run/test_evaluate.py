@@ -16,10 +16,10 @@ from airborne.motion import Motion, MotionWriter, write_joints
 from airborne.motion.covariance_file import write_covariances
 from airborne.run.evaluate import assess, evaluate_agreement
 from tests.support.commands import in_process
+from tests.support.docs import DOCS
 from tests.support.motions import estimate
 from tests.support.players_trial import PLAYERS, write_run, write_truth
 from tests.support.run_files import contents_of, files_of
-from tests.test_docs import DOCS
 
 pytestmark = pytest.mark.usefixtures("_plain_figures")
 

@@ -21,9 +21,9 @@ from airborne.tracking import Status
 from airborne.trial.file import read_trial
 from tests.cli.test_cli import in_process
 from tests.support.clips import write_clip
+from tests.support.docs import DOCS, named, table_of
 from tests.support.players_trial import BYSTANDER, PLAYERS, StandIn, pictures, points_of, stand_in, write_trial
 from tests.support.run_files import files_of
-from tests.test_docs import DOCS, named, table_of
 
 TABLES = {
     *("joints.csv", "tables/joints.parquet", "jumps.csv"),

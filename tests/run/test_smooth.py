@@ -13,10 +13,10 @@ from airborne.motion import MotionWriter
 from airborne.motion.smoothing.smoother import Smoothing
 from airborne.run.smooth import smooth_run
 from tests.cli.test_cli import in_process, refusal
+from tests.support.docs import DOCS, named, table_of
 from tests.support.motions import somersault
 from tests.support.players_trial import write_run
 from tests.support.run_files import contents_of, files_of
-from tests.test_docs import DOCS, named, table_of
 
 pytestmark = pytest.mark.usefixtures("_plain_figures")
 

@@ -27,8 +27,8 @@ from airborne.types import Array, Triple
 
 _CLEARLY_BETTER = 0.98  # of the unshifted distance
 _FAR_M = 0.1  # a joint that far off is misplaced
-# [mm] mean distance of paths of something else, without constant offsets or a shift of the world: no tracked person
-# errs by a third of it
+# [mm] chosen: mean distance of paths of something else, without constant offsets or a shift of the world; no tracked
+# person errs by a third of it
 _ELSEWHERE_MM = 300.0
 
 

@@ -69,8 +69,10 @@ def prepare_folder(
     if not record.exists() and not rows.exists() and foreign:
         raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
     refuse_links(folder)
-    if record.exists() and (overwrite or (is_first_frame_alone(read_record(record)) and not resume)):
-        _remove_run(folder)
+    if record.exists() and not resume:
+        recorded = read_record(record)  # what is damaged is not removed
+        if overwrite or is_first_frame_alone(recorded):
+            _remove_run(folder)
     if rows.exists() and not resume:
         raise RunThereError(
             f"{folder} already holds a run; resume it (--resume), overwrite it (--overwrite), or give another folder"

@@ -268,7 +268,7 @@ def _validate(table: dict[str, Any], changes: dict[str, Any], where: str, given_
         except MistakesError:
             changes = {}
     said = rf"^track(\.|: )({'|'.join(map(re.escape, changes))}): "  # where it stands in the file, as its name is said
-    raise MistakesError(where, [re.sub(said, "", each) if changes else each for each in found.plain], found.places)
+    raise MistakesError(where, [re.sub(said, "", each) for each in found.plain], found.places)
 
 
 def list_wrong_names(trial: Trial) -> list[str]:

@@ -27,7 +27,7 @@ def check_net(rig: Rig, points: ControlPoints, *, most_px: float) -> list[Findin
     if not max(floor_px, misses_px[best]) <= most_px < stated_px:
         return []
     rise_m = float(_RISES_M[best])
-    stated_m = _height_m_of(points)
+    stated_m = _net_height_m(points)
     return [
         Finding(
             kind="misfit",
@@ -38,7 +38,7 @@ def check_net(rig: Rig, points: ControlPoints, *, most_px: float) -> list[Findin
     ]
 
 
-def _height_m_of(points: ControlPoints) -> float:
+def _net_height_m(points: ControlPoints) -> float:
     """Return the height of the net over the middle of the court that its points were placed by [m]."""
     height_m = 2.0  # of any net: its points rise as it does
     low = court_points(height_m)

@@ -22,12 +22,13 @@ from airborne.motion.flight.fall import fit_fall
 from airborne.motion.flight.momentum import centre_of_mass
 from airborne.types import Array
 
-# [m2/s3] of the centre of mass's acceleration beside gravity, an sd of 0.3 m/s2 at 50 frames/s; of 0.3, 0.5 and 1 m/s2
-# the least errors of six synthetic people, four of them tracked with bodies of other lengths and girths
+# [m2/s3] of the centre of mass's acceleration beside gravity, an sd of 0.3 m/s2 at 50 frames/s; chosen: of 0.3, 0.5, 1
+# m/s2 the least errors of six synthetic people, four of them tracked with bodies of other lengths and girths
 _FALL_DENSITY = 0.3**2 / 50
 # [rad2/s3] of what turns the whole body in flight, an sd of 2.5 rad/s2 at 50 frames/s: it seems to be turned as it
-# bends, for its masses are not quite the person's. Of 1, 2.5, 7, 20 rad/s2 and none, joints of six synthetic people,
-# all of other bones than the body's, err least; angular momenta by 0.9 kg m2/s about the worst axis, with none by 1.3
+# bends, for its masses are not quite the person's. Chosen: of 1, 2.5, 7, 20 rad/s2 and none, joints of six synthetic
+# people, all of other bones than the body's, err least; angular momenta by 0.9 kg m2/s about the worst axis, with none
+# by 1.3
 _TURN_DENSITY = 2.5**2 / 50
 
 
