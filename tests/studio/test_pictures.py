@@ -84,7 +84,7 @@ def test_a_key_frame_comes_while_another_image_is_decoded_from_it(tmp_path):
 
 
 def wait_until(is_so):
-    end = monotonic() + 90  # threads of the lowest priority, beside busy workers
+    end = monotonic() + 180  # threads of the lowest priority, beside busy workers
     while not is_so() and monotonic() < end:
         sleep(0.01)
     assert is_so()
