@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from airborne.studio import commands
 from airborne.studio.commands import Command
 from airborne.studio.pages import body, cameras, results
 from airborne.studio.session import Session
@@ -25,7 +26,8 @@ def slow(function):
 
 
 def slow_down():
-    """Let what the studio reads, and the end of a command, take their time."""
+    """Let what the studio reads, and the end of a command, take their time; a command goes on until it is stopped."""
+    commands._RUN = "import time; time.sleep(600)"
     body.list_bodies, body.list_measurements = slow(body.list_bodies), slow(body.list_measurements)
     cameras.list_calibrations = slow(cameras.list_calibrations)
     results._read_run = slow(results._read_run)

@@ -52,6 +52,8 @@ def undistort(xy: Array, coefficients: Array) -> Array:
         for _ in range(_N_STEPS):
             error = distort(ideal, coefficients) - xy
             ideal = ideal - np.einsum("...ij,...j->...i", _inverse_jacobian(ideal, coefficients), error)
+            if np.all(np.abs(error) <= _TOLERANCE):
+                break  # a step from there is exact to the last digits
         error = np.abs(distort(ideal, coefficients) - xy).max(axis=-1)
         is_before_fold = np.linalg.det(_inverse_jacobian(ideal, coefficients)) > 0
     is_solved = is_before_fold & (error <= _TOLERANCE * (1 + np.abs(xy).max(axis=-1)))

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras.camera import Camera
-from airborne.cameras.distortion import distort, distort_fisheye, radial_factor
+from airborne.cameras.distortion import distort, distort_fisheye
+from airborne.kernels import kernel
 from airborne.types import Array
 
 N_PARAMETERS = 18  # of a camera: rotation (3) [rad], centre (3) [m], fx, fy, cx, cy [px], eight lens terms
@@ -37,25 +38,13 @@ def project_with_jacobian(
     Arguments as in `project`. The parameters are `CAMERA_PARAMETERS`: a rotation about the camera's own axes,
     `R <- exp(rotation) R`, and steps of the others. Behind the camera the pixels are NaN and the derivatives 0.
     """
-    xyz = np.einsum("nij,nj->ni", R, world - centre)
-    is_seen = xyz[:, 2] > _NEAREST_DEPTH_M
-    z = np.where(is_seen, xyz[:, 2], 1.0)
-    xy = np.where(is_seen[:, None], xyz[:, :2], 0.0) / z[:, None]
-    distorted = _distort(xy, intrinsics[:, 4:], is_fisheye)
-    by_xy, by_terms = _lens_jacobian(xy, intrinsics[:, 4:], is_fisheye)
-    to_plane = np.zeros((len(xy), 2, 3))  # d xy / d xyz
-    to_plane[:, 0, 0] = to_plane[:, 1, 1] = 1 / z
-    to_plane[:, :, 2] = -xy / z[:, None]
-    by_xyz = intrinsics[:, :2, None] * (by_xy @ to_plane)
-    by_world = by_xyz @ R
-    jacobian = np.zeros((len(xy), 2, N_PARAMETERS))
-    jacobian[:, :, :3] = -by_xyz @ cross_matrices(xyz)
-    jacobian[:, :, 3:6] = -by_world
-    jacobian[:, [0, 1], [6, 7]] = distorted
-    jacobian[:, [0, 1], [8, 9]] = 1.0
-    jacobian[:, :, 10:] = intrinsics[:, :2, None] * by_terms
-    px = np.where(is_seen[:, None], intrinsics[:, :2] * distorted + intrinsics[:, 2:4], np.nan)
-    return px, np.where(is_seen[:, None, None], jacobian, 0.0), np.where(is_seen[:, None, None], by_world, 0.0)
+    n = len(world)
+    shapes = (n, 3, 3), (n, 3), (n, 12), (n, 3)
+    arrays = [
+        np.ascontiguousarray(np.broadcast_to(each, shape), np.float64)
+        for each, shape in zip((R, centre, intrinsics, world), shapes, strict=True)
+    ]
+    return _linearise(*arrays, np.ascontiguousarray(is_fisheye))
 
 
 def cross_matrices(v: Array) -> Array:
@@ -98,44 +87,77 @@ def _distort(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> Array:
     return distorted
 
 
-def _lens_jacobian(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the derivatives of the distorted points by the undistorted ones (n, 2, 2) and by the terms (n, 2, 8)."""
-    by_xy, by_terms = _brown_jacobian(xy, terms)
-    if is_fisheye.any():
-        by_xy[is_fisheye], by_terms[is_fisheye] = _fisheye_jacobian(xy[is_fisheye], terms[is_fisheye])
-    return by_xy, by_terms
+@kernel
+def _linearise(R, centre, intrinsics, world, is_fisheye):
+    """Return pixels and derivatives as `project_with_jacobian`."""
+    n = len(world)
+    px, by_camera, by_world = np.full((n, 2), np.nan), np.zeros((n, 2, N_PARAMETERS)), np.zeros((n, 2, 3))
+    xyz, distorted, by_xy, by_terms, by_xyz = np.empty(3), np.empty(2), np.empty((2, 2)), np.empty((2, 8)), np.empty(3)
+    for k in range(n):
+        for i in range(3):
+            xyz[i] = 0.0
+            for j in range(3):
+                xyz[i] += R[k, i, j] * (world[k, j] - centre[k, j])
+        if xyz[2] <= _NEAREST_DEPTH_M:
+            continue
+        x, y = xyz[0] / xyz[2], xyz[1] / xyz[2]
+        if is_fisheye[k]:
+            _distort_fisheye(x, y, intrinsics[k, 4:], distorted, by_xy, by_terms)
+        else:
+            _distort_brown(x, y, intrinsics[k, 4:], distorted, by_xy, by_terms)
+        for i in range(2):
+            f, of_image = intrinsics[k, i], by_camera[k, i]
+            px[k, i] = f * distorted[i] + intrinsics[k, 2 + i]
+            by_xyz[0], by_xyz[1] = f * by_xy[i, 0] / xyz[2], f * by_xy[i, 1] / xyz[2]
+            by_xyz[2] = -(x * by_xyz[0] + y * by_xyz[1])
+            for j in range(3):  # by a rotation: xyz x by_xyz
+                one, two = (j + 1) % 3, (j + 2) % 3
+                of_image[j] = xyz[one] * by_xyz[two] - xyz[two] * by_xyz[one]
+            for j in range(3):
+                by_world[k, i, j] = by_xyz[0] * R[k, 0, j] + by_xyz[1] * R[k, 1, j] + by_xyz[2] * R[k, 2, j]
+                of_image[3 + j] = -by_world[k, i, j]
+            of_image[6 + i], of_image[8 + i] = distorted[i], 1.0
+            for j in range(8):
+                of_image[10 + j] = f * by_terms[i, j]
+    return px, by_camera, by_world
 
 
-def _brown_jacobian(xy: Array, terms: Array) -> tuple[Array, Array]:
-    _, _, p1, p2, _, k4, k5, k6 = terms.T
-    x, y = xy.T
+@kernel(is_inner=True)
+def _distort_brown(x, y, terms, distorted, by_xy, by_terms):
+    """Fill in a distorted point (2,), its derivatives by the point (2, 2) and by the terms (2, 8)."""
+    k1, k2, p1, p2, k3, k4, k5, k6 = terms[0], terms[1], terms[2], terms[3], terms[4], terms[5], terms[6], terms[7]
     r2 = x * x + y * y
-    radial, radial_derivative = radial_factor(r2, terms.T)
-    by_xy = np.empty((len(xy), 2, 2))
-    by_xy[:, 0, 0] = radial + x * x * radial_derivative + 2 * p1 * y + 6 * p2 * x
-    by_xy[:, 1, 1] = radial + y * y * radial_derivative + 6 * p1 * y + 2 * p2 * x
-    by_xy[:, 0, 1] = by_xy[:, 1, 0] = x * y * radial_derivative + 2 * p1 * x + 2 * p2 * y
-    by_above = np.stack([r2, r2**2, r2**3], axis=-1) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))[:, None]
-    by_terms = np.empty((len(xy), 2, 8))
-    by_terms[:, :, [0, 1, 4]] = xy[:, :, None] * by_above[:, None]
-    by_terms[:, :, 5:] = -radial[:, None, None] * by_terms[:, :, [0, 1, 4]]
-    by_terms[:, 0, 2], by_terms[:, 0, 3] = 2 * x * y, r2 + 2 * x * x
-    by_terms[:, 1, 2], by_terms[:, 1, 3] = r2 + 2 * y * y, 2 * x * y
-    return by_xy, by_terms
+    below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / below
+    slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3)) - radial * 2 * (k4 + r2 * (2 * k5 + r2 * 3 * k6))
+    slope /= below
+    distorted[0] = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    distorted[1] = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    by_xy[0, 0] = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+    by_xy[1, 1] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+    by_xy[0, 1] = by_xy[1, 0] = x * y * slope + 2 * p1 * x + 2 * p2 * y
+    for i, at in ((0, x), (1, y)):
+        power = at / below
+        for j in range(3):
+            power *= r2
+            by_terms[i, 4 if j == 2 else j], by_terms[i, 5 + j] = power, -radial * power
+    by_terms[0, 2], by_terms[0, 3] = 2 * x * y, r2 + 2 * x * x
+    by_terms[1, 2], by_terms[1, 3] = r2 + 2 * y * y, 2 * x * y
 
 
-def _fisheye_jacobian(xy: Array, terms: Array) -> tuple[Array, Array]:
-    r = np.maximum(np.hypot(xy[:, 0], xy[:, 1]), 1e-8)
-    angle = np.arctan(r)
-    powers = angle[:, None] ** np.array([3, 5, 7, 9])
-    radius = angle + np.einsum("nk,nk->n", terms[:, :4], powers)
-    radius_derivative = 1 + np.einsum("nk,nk->n", terms[:, :4] * [3, 5, 7, 9], powers / angle[:, None])
+@kernel(is_inner=True)
+def _distort_fisheye(x, y, terms, distorted, by_xy, by_terms):
+    """Fill in the same of a fisheye lens, which has four terms."""
+    r = max(np.sqrt(x * x + y * y), 1e-8)
+    angle, by_terms[:] = np.arctan(r), 0.0
+    radius, radius_slope, power = angle, 1.0, angle
+    for j in range(4):
+        power *= angle * angle
+        radius += terms[j] * power
+        radius_slope += (3 + 2 * j) * terms[j] * power / angle
+        by_terms[0, j], by_terms[1, j] = x / r * power, y / r * power
     scale = radius / r
-    scale_derivative = (radius_derivative / (1 + r * r) - scale) / r  # d scale / d r
-    unit = xy / r[:, None]
-    by_xy = (
-        scale[:, None, None] * np.eye(2) + (scale_derivative * r)[:, None, None] * unit[:, :, None] * unit[:, None, :]
-    )
-    by_terms = np.zeros((len(xy), 2, 8))
-    by_terms[:, :, :4] = unit[:, :, None] * powers[:, None, :]
-    return by_xy, by_terms
+    slope = radius_slope / (1 + r * r) - scale  # of the scale by r, times r
+    distorted[0], distorted[1] = scale * x, scale * y
+    by_xy[0, 0], by_xy[1, 1] = scale + slope * (x / r) ** 2, scale + slope * (y / r) ** 2
+    by_xy[0, 1] = by_xy[1, 0] = slope * (x / r) * (y / r)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.rendering.srgb import light_from_srgb
+from airborne.tracking.self_check.offset_equations import light_equations, light_residuals, mixture_equations
 from airborne.tracking.self_check.registration import (
     CONVERGED_PX,
     N_SIMILARITY,
@@ -36,7 +37,7 @@ _MOST_STEPS = 6  # at the likeliest blur
 _LEAST_MIXED = 1 / 255  # of a share times the rest of the pixel, at the widest blur: less changes no grey level
 _MARGIN_PX = 8  # about the silhouette
 _MOST_PX, _MOST_TURN = 2.0, 0.05  # of one step: shift and width, turn and scale
-_LEAST_COVERED, _LEAST_SQUARE = 1e-6, 1e-12  # keep quotients finite
+_LEAST_SQUARE = 1e-12  # keeps quotients finite
 
 
 def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8], empty: NDArray[np.uint8]) -> Array:
@@ -54,14 +55,19 @@ def register_light(silhouette: Silhouette, offset: Array, rgb: NDArray[np.uint8]
     drawn = [warp_plane(silhouette, offset, side) for side in sides]
     near = _near_edges(drawn)
     light, scene = light[near], scene[near]
+    inside = np.sum(drawn, axis=0)[near] > 0.5
+    median = np.median(light[inside], axis=0)
+    args = *near, light, scene
     squares = []
     for sigma in _BLURS_PX:
-        r = _mix(_blur_shares(silhouette, drawn, sigma)[:, *near], light, scene)[1]
-        squares.append(np.einsum("nc,nc->n", r, r))
+        shares = _blur_shares(silhouette, drawn, sigma)
+        squares.append(light_residuals(shares, _light_of_sides(shares, *args, median), *args))
     clip2 = _CLIP_MEDIANS**2 * max(min(float(np.median(each)) for each in squares), _LEAST_SQUARE)
     sigma = _BLURS_PX[int(np.argmin([np.sum(each / (clip2 + each)) for each in squares]))]
     for _ in range(_MOST_STEPS):
-        step = _step(*_linearise(silhouette, sides, offset, sigma, near=near, light=light, scene=scene), clip2)
+        shares = _blur_shares(silhouette, [warp_plane(silhouette, offset, side) for side in sides], sigma)
+        own = _light_of_sides(shares, *args, median)
+        step = _step(*light_equations(shares, own, *args, silhouette.middle, offset, clip2))
         offset = offset + step
         if np.hypot(step[0], step[1]) < CONVERGED_PX:
             break
@@ -105,53 +111,16 @@ def _blur_shares(silhouette: Silhouette, drawn: list[NDArray[np.float32]], sigma
     return np.stack([np.asarray(cv2.GaussianBlur(side, (0, 0), sigma, sigmaY=sigma_y), np.float32) for side in drawn])
 
 
-def _mix(
-    shares: NDArray[np.float32], light: NDArray[np.float32], scene: NDArray[np.float32]
-) -> tuple[Array, NDArray[np.float32]]:
-    """Return the sides' light (k, 3) that gives n pixels best, and the residual (n, 3).
-
-    shares (k, n); light, scene (n, 3): what the image shows, and what lies behind the body.
-    """
-    covered = shares.sum(axis=0)[:, None]
-    inside = covered[:, 0] > 0.5
-    A, Y = shares[:, inside].T, (light - (1 - covered) * scene)[inside]
-    median = np.median(light[inside], axis=0)
-    own = np.linalg.solve(A.T @ A + _TO_MEDIAN * np.eye(len(shares)), A.T @ Y + _TO_MEDIAN * median)
-    return own, light - (shares.T @ own + (1 - covered) * scene)
+def _light_of_sides(
+    shares: NDArray[np.float32], rows: Ints, columns: Ints, light: Array, scene: Array, median: Array
+) -> Array:
+    """Return the sides' light (k, 3) that gives the n pixels best; `median` (3,) is that of the body."""
+    A, B = mixture_equations(shares, rows, columns, light, scene)
+    return np.linalg.solve(A + _TO_MEDIAN * np.eye(len(A)), B + _TO_MEDIAN * median)
 
 
-def _linearise(
-    silhouette: Silhouette,
-    sides: list[NDArray[np.float32]],
-    offset: Array,
-    sigma: float,
-    *,
-    near: tuple[Ints, Ints],
-    light: NDArray[np.float32],
-    scene: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the residual (n, 3) of the n pixels `near`, the sides' light eliminated, and how the drawn light changes.
-
-    light, scene (n, 3) are compared; the change (5, n, 3) is by the offset (5,).
-    """
-    planes = _blur_shares(silhouette, [warp_plane(silhouette, offset, side) for side in sides], sigma)
-    y, x = near
-    gx, gy = (np.stack([cv2.Sobel(share, cv2.CV_32F, i, 1 - i, scale=1 / 8)[y, x] for share in planes]) for i in (1, 0))
-    shares = planes[:, y, x]
-    own, r = _mix(shares, light, scene)
-    covered, sides_gx, sides_gy = (each.sum(axis=0)[:, None] for each in (shares, gx, gy))
-    by_x, by_y = gx.T @ own - sides_gx * scene, gy.T @ own - sides_gy * scene
-    by_width = np.hypot(sides_gx, sides_gy) * ((shares.T @ own) / np.maximum(covered, _LEAST_COVERED) - scene)
-    dx, dy = (x - silhouette.middle[0] - offset[0])[:, None], (y - silhouette.middle[1] - offset[1])[:, None]
-    change = np.stack([-by_x, -by_y, by_x * dy - by_y * dx, -by_x * dx - by_y * dy, by_width])
-    return r - offset[4] * by_width, change
-
-
-def _step(r: NDArray[np.float32], change: NDArray[np.float32], clip2: float) -> Array:
-    """Return a Gauss-Newton step of the offset (5,); a squared residual of `clip2` has a quarter of the weight."""
-    J = change.reshape(len(change), -1)
-    weight = np.repeat(1 / (1 + np.einsum("nc,nc->n", r, r) / clip2) ** 2, r.shape[1])
-    H = (J * weight) @ J.T
-    step = np.linalg.solve(H + 1e-6 * np.diag(np.diag(H)) + 1e-9 * np.eye(len(H)), (J * weight) @ r.ravel())
+def _step(H: Array, g: Array) -> Array:
+    """Return a Gauss-Newton step of the offset (5,) by its normal equations."""
+    step = np.linalg.solve(H + 1e-6 * np.diag(np.diag(H)) + 1e-9 * np.eye(len(H)), g)
     most = np.array([_MOST_PX, _MOST_PX, _MOST_TURN, _MOST_TURN, _MOST_PX])
     return np.clip(step, -most, most)

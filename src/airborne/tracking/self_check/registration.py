@@ -17,6 +17,7 @@ from airborne.body import PosedBody
 from airborne.cameras import Camera
 from airborne.rendering.maps import SurfaceMaps
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.self_check.offset_equations import foreground_equations
 from airborne.types import Array
 
 N_SIMILARITY = 4  # shift right, shift down [px], turn clockwise [rad], log scale, about the silhouette's middle
@@ -29,7 +30,9 @@ _TURNS = np.radians([-12, 0, 12])  # of the coarse search
 _COARSE = 4  # reduction of the coarse search
 _SIGMA_PX = (4.0, 2.0, 1.2)  # blurs of the fine registration, coarse to fine
 _STEPS = 6  # at each blur, at most
+_NEAR = 0.1  # of a blur but the last: a step that moves nothing further is its last, as the next goes on from there
 CONVERGED_PX = 0.02  # a step that moves nothing further is the last; offsets err by some tenths of a pixel
+_LEAST_STEEP = 0.02  # of the steepest gradient, below which a pixel is no outline
 _CLIP = 0.35  # a residual of the foreground this large has a quarter of the weight
 _LEAST_OVERLAP = 0.55  # correlation of silhouette and foreground below which a view says nothing
 _CLEAR_OVERLAP = 0.9  # above it a silhouette is found from where it is: in 81 views of 81 as by a search
@@ -186,12 +189,15 @@ def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array) -
     """Refine an offset (4,) on images less and less blurred; return it, and how silhouette and foreground correlate."""
     offset = np.append(offset, 0.0)  # the last: how much wider the outline is [px]
     for sigma in _SIGMA_PX:
-        offset = _refine_at(silhouette, shown, offset, sigma)
+        converged_px = CONVERGED_PX if sigma == _SIGMA_PX[-1] else _NEAR * sigma
+        offset = _refine_at(silhouette, shown, offset, sigma, converged_px=converged_px)
     drawn = warp_plane(silhouette, offset, blur(silhouette.mask, _SIGMA_PX[-1]))
     return offset[:N_SIMILARITY], _correlation(drawn, blur(shown, _SIGMA_PX[-1]))
 
 
-def _refine_at(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float) -> Array:
+def _refine_at(
+    silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float, *, converged_px: float
+) -> Array:
     """Step to the least squares of blurred silhouette and foreground, robustly.
 
     offset (5,): shift, turn, scale and how much wider the outline is [px of the silhouette].
@@ -202,7 +208,7 @@ def _refine_at(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array
         step = _refinement_step(silhouette, image, mask, offset, sigma=sigma)
         offset = offset + step
         offset[4] = np.clip(offset[4], -2, 2)
-        if np.abs(step * [1, 1, reach, reach, 1]).max() < CONVERGED_PX:
+        if np.abs(step * [1, 1, reach, reach, 1]).max() < converged_px:
             break
     return offset
 
@@ -212,19 +218,10 @@ def _refinement_step(
 ) -> Array:
     """Return the step (5,) of least squares, no longer than the blur reaches."""
     drawn = warp_plane(silhouette, offset, mask)
-    gx, gy = cv2.Sobel(drawn, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(drawn, cv2.CV_32F, 0, 1, scale=1 / 8)
-    steep = np.sqrt(gx * gx + gy * gy)
-    near = np.flatnonzero(steep > 0.02 * steep.max())
-    y, x = np.divmod(near, image.shape[1])
-    gx, gy, steep, drawn_near, image_near = (plane.ravel()[near] for plane in (gx, gy, steep, drawn, image))
-    r = image_near - (drawn_near + offset[4] * steep)
-    dx, dy = x - silhouette.middle[0] - offset[0], y - silhouette.middle[1] - offset[1]
-    J = np.stack([-gx, -gy, gx * dy - gy * dx, -gx * dx - gy * dy, steep])
-    weight = 1 / (1 + (r / _CLIP) ** 2) ** 2
-    H = (J * weight) @ J.T
+    H, g = foreground_equations(drawn, image, silhouette.middle, offset, _CLIP, _LEAST_STEEP)
     H[np.diag_indices(5)] *= 1 + 1e-6
     H[4, 4] += 1e-9
-    step = np.linalg.solve(H + 1e-9 * np.eye(5), (J * weight) @ r)
+    step = np.linalg.solve(H + 1e-9 * np.eye(5), g)
     step[:2] = np.clip(step[:2], -3 * sigma, 3 * sigma)
     step[2:4] = np.clip(step[2:4], -0.05, 0.05)
     return step
