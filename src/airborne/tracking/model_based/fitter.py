@@ -26,8 +26,8 @@ from airborne.tracking.model_based.gauss_newton import (
     PyramidLevels,
     fit_images,
     fit_silhouettes,
-    image_evaluator,
     linearise_fit,
+    weigh_images,
 )
 from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.learned_regions import LearnedRegions
@@ -115,11 +115,7 @@ class Fitter:
 
     def weigh(self, poses: Sequence[Pose], learned: LearnedRegions) -> Array:
         """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat]."""
-        views = self._views(poses, learned)
-        evaluate = image_evaluator(self.render_model, poses, views, dofs=self.stages[-1])[0]
-        equations = [evaluate(pose, True) for pose in poses]
-        noise = min(each.noise for each in equations)
-        return np.array([each.objective(noise, 0.0) for each in equations])
+        return weigh_images(self.render_model, poses, self._views(poses, learned))
 
     def judge(
         self,

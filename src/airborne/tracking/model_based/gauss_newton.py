@@ -30,7 +30,7 @@ from airborne.tracking.model_based.render_model import (
     silhouette_buffers,
 )
 from airborne.tracking.model_based.shape_error import shape_error_gradients, shape_error_px
-from airborne.tracking.model_based.twist_equations import Sums, new_blocks
+from airborne.tracking.model_based.twist_equations import Sums, new_blocks, one_block
 from airborne.types import Array
 
 PyramidLevels = Sequence[tuple[int, int]]
@@ -118,19 +118,18 @@ def fit_silhouettes(
             pose: Pose, _: bool, views: list[ViewBuffers] = views, empty_cost: float = empty_cost
         ) -> PoseEquations:
             posed, n = render_model.with_pose(pose), len(render_model.model.segments)
-            sums, totals, blocks = Sums.zero(n), np.array([empty_cost, 0.0, 0.0]), []
+            sums, totals = Sums.zero(n), np.array([empty_cost, 0.0, 0.0])
             for view in views:
-                blocks.append(_blocks(view, n))
                 comparison = Comparison(taps, taps, _CLIP_MASK)
                 args = render_model.body, view.projection(posed), view.observation, comparison, view.maps
-                totals += np.array(photometric_equations(*args, *MASK, sums, blocks[-1]))
+                totals += np.array(photometric_equations(*args, *MASK, sums, one_block(n)))
             return map_to_dofs(
                 render_model,
                 dofs,
                 pose,
                 posed,
                 sums=sums,
-                blocks=blocks,
+                blocks=[],
                 shifted=[],
                 totals=totals,
                 correlated=correlated,
@@ -186,7 +185,7 @@ def image_evaluator(
     """
     bodies = [render_model.with_pose(pose) for pose in poses]
     empty_cost = sum(view.buffers.empty_cost for view in views)
-    correlated = float(np.mean([view.noise_px for view in views] or [NOISE_PX]))
+    correlated = correlated_px(views)
     shape_px = [shape_error_px(view.buffers, bodies[0]) for view in views] if dofs.moves_joints else []
     shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
@@ -196,7 +195,7 @@ def image_evaluator(
         noise_of_views = []
         for image in views:
             sums.B[:] = 0
-            blocks.append(_blocks(image.buffers, n))
+            blocks.append(new_blocks(image.buffers.whole.x1, image.buffers.whole.y1, n))
             of_view = _add_image_equations(
                 render_model, posed, image, iterations=3 if is_first else 1, sums=sums, blocks=blocks[-1]
             )
@@ -222,11 +221,35 @@ def image_evaluator(
     return evaluate, correlated
 
 
+def correlated_px(views: Sequence[ImageView]) -> float:
+    """Return how many pixels of the images have their noise in common."""
+    return float(np.mean([view.noise_px for view in views] or [NOISE_PX]))
+
+
+def weigh_images(render_model: RenderModel, poses: Sequence[Pose], views: Sequence[ImageView]) -> Array:
+    """Return minus the log-likelihood of the images in each pose, by the noise of the best one: (n,) [nat].
+
+    The light is fitted to each.
+    """
+    totals = np.zeros((len(poses), 3))
+    for of_pose, pose in zip(totals, poses, strict=True):
+        posed = render_model.with_pose(pose)
+        for image in views:
+            of_pose += _weigh(render_model, posed, image)
+    empty_cost = sum(view.buffers.empty_cost for view in views)
+    cost, residual, weight = totals.T
+    noise = correlated_px(views) * np.divide(residual, weight, out=np.ones(len(poses)), where=weight > 0)
+    return 0.5 * (cost + empty_cost) / noise.min()
+
+
 def weigh_image(render_model: RenderModel, posed: PosedBody, image: ImageView) -> float:
     """Return what an image costs with a body, less what it costs without; its light is fitted."""
-    n = len(posed.R)
-    sums, blocks = Sums.zero(n), _blocks(image.buffers, n)
-    return float(_add_image_equations(render_model, posed, image, iterations=3, sums=sums, blocks=blocks)[0])
+    return float(_weigh(render_model, posed, image)[0])
+
+
+def _weigh(render_model: RenderModel, posed: PosedBody, image: ImageView) -> Array:
+    """Return the totals of `_add_image_equations`, its light being fitted anew, without the equations."""
+    return _add_image_equations(render_model, posed, image, iterations=3, sums=Sums.zero(0), blocks=one_block(0))
 
 
 def _add_image_equations(
@@ -239,7 +262,3 @@ def _add_image_equations(
         return np.array(photometric_equations(*args, render_model.paint, view.light, iterations, sums, blocks))
     lamps, ambient = view.light
     return np.array(equations_of_known_light(*args, render_model.paint, lamps, ambient, sums, blocks))
-
-
-def _blocks(view: ViewBuffers, n_segments: int) -> Array:
-    return new_blocks(view.whole.x1, view.whole.y1, n_segments)

@@ -78,7 +78,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
         fit_light(observation.observed, *of_body, light, iterations, x0, y0, x1, y1)
         lit = np.empty(maps.normals.shape, np.float32)
         shade_body(maps.part, maps.normals, paint.albedo, light, x0, y0, lit[:, y0:y1, x0:x1])
-    owner, nearness = _owners(body, len(projection.R), maps, box)
+    owner, nearness = _owners(body, len(sums.A), maps, box)
     flat = _flatten(lit, maps.part, paint, box)
     return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 
@@ -87,7 +87,7 @@ def photometric_equations(body, projection, observation, comparison, maps, paint
 def equations_of_known_light(body, projection, observation, comparison, maps, paint, lamps, ambient, sums, blocks):
     """Add one view's equations under known lights, in shares of full sRGB; lamps (l, 8), ambient as in `draw_maps`."""
     lit, box = light_by_lamps(body, projection, maps, lamps, ambient), mask_box(maps.part)
-    owner, nearness = _owners(body, len(projection.R), maps, box)
+    owner, nearness = _owners(body, len(sums.A), maps, box)
     flat = _flatten(lit, maps.part, paint, box)
     return add_rows(lit, flat, maps, owner, nearness, projection, observation, comparison, sums, blocks)
 

@@ -15,6 +15,7 @@ from airborne.tracking.model_based.lanes import (
     CHANGE,
     GRADIENT,
     MINE,
+    SQUARE,
     STRIP,
     SUM_PLANES,
     TERM_PLANES,
@@ -38,9 +39,9 @@ def add_rows(lit, flat, maps, owner, nearness, projection, observation, comparis
 
     lit, flat (c, H, W): the body's colours, and the same as they move with the body, defined on the mask; c = 0 for a
     mask that is compared with its posterior. owner, nearness (H, W) as `find_owners` has them; (0, 0) of a body of one
-    segment. Adds to `sums`, and to `blocks` of `new_blocks` the gradients block by block. Returns (robust squared
-    residual, less that of the image without a body, weighted squared residual, weight), the last two where there is
-    body.
+    segment. Adds to `sums`, and to `blocks` of `new_blocks` the gradients block by block; sums of no segment ask for no
+    equations. Returns (robust squared residual, less that of the image without a body, weighted squared residual,
+    weight), the last two where there is body.
     """
     firsts, lasts = _columns_of_mask(maps.part)
     lows, highs, x0, x1, y0, y1 = _columns_to_compare(firsts, lasts, maps.part)
@@ -53,7 +54,8 @@ def add_rows(lit, flat, maps, owner, nearness, projection, observation, comparis
     ring, blurred, middle = np.zeros((RING, n), np.float32), np.zeros(3 * n, np.float32), np.empty(n, np.float32)
     shape, terms, near = np.zeros(3 * width, np.float32), np.empty(TERM_PLANES, np.float32), np.zeros(STRIP, np.float32)
     own, segments = np.full(STRIP, -1, np.int16), np.zeros(len(sums.A) * SUM_PLANES, np.float32)
-    given, scale, cost, inverse_clip2 = rows.ravel(), _scale(projection), 0.0, f4(1.0 / comparison.clip**2)
+    given, scale, inverse_clip2 = rows.ravel(), _scale(projection), f4(1.0 / comparison.clip**2)
+    cost, total, weight, last_block = 0.0, 0.0, 0.0, (blocks.shape[0] - 1, blocks.shape[1] - 1)
     for y in range(y0 - 1 - RADIUS_PX, y1 + 1 + RADIUS_PX):
         _draw_row(lit, flat, maps, observation.background, firsts, lasts, y, left, width, ring[y % RING])
         ready = y - RADIUS_PX
@@ -83,11 +85,15 @@ def add_rows(lit, flat, maps, owner, nearness, projection, observation, comparis
                 _take_owners(owner[v], nearness[v], x0 + a, min(m, x1 - x0 - a), own, near)
             ours = blurred, here, here + width, given, row + 2 * channels * pitch, row + (2 * channels + 1) * pitch
             cost += weigh_pixels(terms, m, highs[v] - x0 - a, *ours, near, inverse_clip2)
+            if len(sums.A) == 0:
+                for x in range(m):
+                    total += terms[WEIGHT + x] * terms[SQUARE + x]
+                    weight += terms[WEIGHT + x]
+                continue
             for b in range(0, m, LANES):
                 if total_of(terms, WEIGHT + b) > 0:
-                    block = (v - y0) // BLOCK_PX, (a + b) // LANES
+                    block = min((v - y0) // BLOCK_PX, last_block[0]), min((a + b) // LANES, last_block[1])
                     _add_owners(terms, b, own, has_owners, scale, x0 + a + b, v, segments, blocks, block)
-    total, weight = 0.0, 0.0
     for e in range(len(sums.A)):
         total += total_of(segments, SUM_PLANES * e + TOTAL)
         weight += total_of(segments, SUM_PLANES * e + WEIGHTS)

@@ -35,6 +35,11 @@ def new_blocks(width: int, height: int, n_segments: int) -> np.ndarray:
     return np.zeros((height // BLOCK_PX + 1, width // BLOCK_PX + 1, n_segments, 6))
 
 
+def one_block(n_segments: int) -> np.ndarray:
+    """Allocate the gradients of a whole image, as `new_blocks`, where no covariance will be asked for."""
+    return np.zeros((1, 1, n_segments, 6))
+
+
 def merge_blocks(blocks: np.ndarray, n: int) -> np.ndarray:
     """Sum the blocks (rows, columns, s, 6) that hold any gradient into at most n by n patches: (k, m, s, 6)."""
     for axis in (0, 1):
