@@ -11,7 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body.legs import LEG_POINTS
 from airborne.cameras import Camera, Rig, write_pose2sim
 from airborne.motion import PlayersWriter
-from airborne.run import check, players, track
+from airborne.run import check, players, players_mix_ups
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerEstimate
 from tests.support.clips import write_clip
@@ -118,7 +118,7 @@ class StandIn:
 def stand_in(monkeypatch, tracker=None) -> None:
     """Let a stand-in find the players of trials whose pictures show nobody: no mix-up is looked for in them either."""
     monkeypatch.setattr(players, "players_tracker_of", lambda trial, rig: tracker or StandIn())
-    for user in (track, check):
+    for user in (players_mix_ups, check):  # of `track`, which imports it when it is needed, and of `check`
         monkeypatch.setattr(user, "refuse_players_mix_ups", lambda starts, recording: None)
 
 

@@ -8,17 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.body.files import find_mesh_files, write_body
-from airborne.body_fitting.first_frames import EVERY, N_FRAMES, fit_preset
-from airborne.body_fitting.landmark_places import place_landmarks
 from airborne.calibration.from_points import Calibration
 from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
@@ -30,26 +27,27 @@ from airborne.motion.tables import write_uncertainty
 from airborne.run.body_passes import BodyPasses
 from airborne.run.body_tables import missing_masses, write_tables
 from airborne.run.drawing import DrawingThread
-from airborne.run.find import FoundStart
 from airborne.run.first_pose import find_first_pose, out_of_sight
 from airborne.run.key_misses import far_keys
 from airborne.run.keys import keys_of_frames
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
 from airborne.run.untracked import explain_untracked
-from airborne.run.whole_run import FittedRun, fit_whole_run
 from airborne.run.wrong_colours import find_wrong_colours
 from airborne.tracking import Estimate, Status
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose import FirstPose
 from airborne.tracking.methods import sample_body_colours, tracker_of
 from airborne.tracking.self_check.kept_frames import KeptFrames
-from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.trial.settings import BodySettings
 from airborne.types import Progress
 from airborne.video import Frames, Recording
 from airborne.video.rereading import Rereading
+
+if TYPE_CHECKING:
+    from airborne.run.find import FoundStart
+    from airborne.run.whole_run import FittedRun
 
 _UNCERTAINTY = (
     "Standard deviations of position and orientation include image noise, light, and edges not where the drawn "
@@ -130,32 +128,21 @@ class BodyRun:
         return seen
 
     def _fit_shape(self, first: Frames) -> BodyRun:
-        """Return a preset fitted to the person in some of the first frames, those where it is tracked.
+        """Return a preset fitted to the person in the first frames.
 
-        Its landmarks lie where the points of the start mark them. Keys change nothing of it, so that a run to which one
-        is added goes on with its body; they are read anew for its lengths.
+        Keys change nothing of it, so that a run to which one is added goes on with its body; they are read anew for its
+        lengths.
         """
-        body = self.trial.body
-        if body.preset is None:
+        from airborne.run.preset_shape import fit_preset_shape
+
+        if self.trial.body.preset is None:
             return self
-        tracker = tracker_of(self.trial.settings, self.model, self.start)
-        estimates = track_frames(tracker, islice(replace(self.recording, stop=None), N_FRAMES), lambda estimate: None)
-        found = [
-            (frames, estimate.pose)
-            for frames, estimate in islice(estimates, 0, None, EVERY)
-            if estimate.pose is not None and estimate.status is Status.TRACKED
-        ]
-        fitted = fit_preset(self.model, found, mass_kg=body.mass_kg) if found else None
+        args = self.trial, self.model, self.recording, self.start
+        fitted = fit_preset_shape(*args, first=self.first, at_first=first)
         if fitted is None:
             return self
-        index, pose = found[0][0].index, found[0][1]
-        start = pose if index == self.recording.start else self.start
-        if self.first is not None and self.first.points:
-            tracker = tracker_of(self.trial.settings, fitted, start)
-            at_first = tracker.search(tracker.init(), first).pose
-            fitted = fitted if at_first is None else place_landmarks(fitted, at_first, self.first.points)
-        keys = keys_of_frames(self.trial, fitted, self.recording)[0] if self.keys else {}
-        return replace(self, model=fitted, start=start, keys=keys)
+        keys = keys_of_frames(self.trial, fitted[0], self.recording)[0] if self.keys else {}
+        return replace(self, model=fitted[0], start=fitted[1], keys=keys)
 
     def track(
         self,
@@ -262,6 +249,8 @@ class BodyRun:
 
     def _fit_whole_run(self, folder: Path, motion: Motion, progress: Progress | None) -> FittedRun | None:
         """Fit the whole run; what the tracker found stays beside it, for a run that is resumed and for a comparison."""
+        from airborne.run.whole_run import fit_whole_run
+
         estimates, reader = read_estimates(folder / self.table), Rereading(self.recording)
         args = reader, self.trial.settings, self.model, motion, estimates
         fitted = fit_whole_run(*args, keys=self.keys, is_joined=self._passes.is_joined, progress=progress)

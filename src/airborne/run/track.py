@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,15 +26,10 @@ from airborne.motion.run_folder import CALIBRATION, EXPORTS, MOTION, REPORT, SUM
 from airborne.run.body import BodyRun
 from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
-from airborne.run.find import FoundStart, find_start
-from airborne.run.find_players import FoundPlayers, find_players_start
 from airborne.run.folder import is_finished, list_tables, prepare_folder, read_choice
 from airborne.run.identity import run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, dark_start_error, open_live, open_trial, past_the_end_error
-from airborne.run.players import PlayersRun
-from airborne.run.players_mix_ups import refuse_players_mix_ups
-from airborne.run.players_tracker import compile_kernels
 from airborne.run.provenance import provenance_of
 from airborne.run.self_check import alarms
 from airborne.run.subject import AnyMotion, Subject
@@ -42,6 +37,9 @@ from airborne.tracking.tracker import Found
 from airborne.trial.file import Trial
 from airborne.types import Progress, StageProgress
 from airborne.video import LiveRecording, Outages, Recording
+
+if TYPE_CHECKING:
+    from airborne.run.players import PlayersRun
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,31 +95,12 @@ def track_trial(
     if take is not None and not trial.start.find:
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")
     started_s = time.monotonic()
-    found: FoundStart | FoundPlayers | None = None
     with sole_writer(folder), ExitStack() as stack:  # from the beginning: to find the start takes its time
-        if trial.start.find:
-            find = find_players_start if trial.has_players else find_start
-            looking = _of_stage("looking for the start", stage_progress, progress)
-            found = find(trial, folder, take=take, progress=looking)
-            trial = found.trial
-        if first_frame:
-            alone = {"start": None, "stop": trial.start.frame + 1}
-            trial = trial.model_copy(update={"track": trial.track.model_copy(update=alone)})
         drawn = None if not pictures else "stills" if first_frame else "videos"
         options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress, stage_progress)
-        facts = None if found is None else found.facts
         if trial.has_players:
-            opened = _open_live(trial, stack, progress) if live else open_trial(trial, facts)
-            opened.recording.events.extend([] if found is None else [found.note])
-            players = PlayersRun.open(trial, opened)
-            if isinstance(opened.recording, Recording):
-                refuse_players_mix_ups(players.starts, opened.recording)
-            return _run(players, options, stack)
-        opened = open_trial(trial, facts)
-        with start_foregrounds(opened.recording) as foregrounds:
-            body = BodyRun.open(trial, opened, found if isinstance(found, FoundStart) else None)
-            refuse_mix_ups(body.recording.rig, foregrounds, body.model, body.start)
-        return _run(body, options, stack)
+            return _run(_open_players(trial, options, stack, first_frame=first_frame), options, stack)
+        return _run(_open_body(trial, options, first_frame=first_frame), options, stack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +114,50 @@ class _Options:
     take: int | None  # of the poses that were found
     progress: Progress | None
     stage_progress: StageProgress | None
+
+
+def _open_body(trial: Trial, options: _Options, *, first_frame: bool) -> BodyRun:
+    """Open a trial of one body, whose start may have to be found."""
+    found = None
+    if trial.start.find:
+        from airborne.run.find import find_start
+
+        looking = _of_stage("looking for the start", options.stage_progress, options.progress)
+        found = find_start(trial, options.folder, take=options.take, progress=looking)
+        trial = found.trial
+    trial = _with_first_frame_alone(trial) if first_frame else trial
+    opened = open_trial(trial, None if found is None else found.facts)
+    with start_foregrounds(opened.recording) as foregrounds:
+        body = BodyRun.open(trial, opened, found)
+        refuse_mix_ups(body.recording.rig, foregrounds, body.model, body.start)
+    return body
+
+
+def _open_players(trial: Trial, options: _Options, stack: ExitStack, *, first_frame: bool) -> PlayersRun:
+    """Open a trial of players, whose start may have to be found; live cameras stay open for as long as the stack is."""
+    from airborne.run.players import PlayersRun
+    from airborne.run.players_mix_ups import refuse_players_mix_ups
+
+    found = None
+    if trial.start.find:
+        from airborne.run.find_players import find_players_start
+
+        looking = _of_stage("looking for the start", options.stage_progress, options.progress)
+        found = find_players_start(trial, options.folder, take=options.take, progress=looking)
+        trial = found.trial
+    trial = _with_first_frame_alone(trial) if first_frame else trial
+    facts = None if found is None else found.facts
+    opened = _open_live(trial, stack, options.progress) if options.live else open_trial(trial, facts)
+    opened.recording.events.extend([] if found is None else [found.note])
+    players = PlayersRun.open(trial, opened)
+    if isinstance(opened.recording, Recording):
+        refuse_players_mix_ups(players.starts, opened.recording)
+    return players
+
+
+def _with_first_frame_alone(trial: Trial) -> Trial:
+    alone = {"start": None, "stop": trial.start.frame + 1}
+    return trial.model_copy(update={"track": trial.track.model_copy(update=alone)})
 
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
@@ -203,6 +226,8 @@ def _of_stage(stage: str, report: StageProgress | None, otherwise: Progress | No
 
 def _open_live(trial: Trial, stack: ExitStack, progress: Progress | None) -> Opened[LiveRecording]:
     """Open a trial's live cameras for as long as the stack is."""
+    from airborne.run.players_tracker import compile_kernels
+
     compile_kernels(trial)
     return stack.enter_context(open_live(trial, (lambda: None) if progress is None else (lambda: progress(0, None))))
 
