@@ -166,7 +166,7 @@ def inpaint(mean, n_observations, out):
     return True
 
 
-@kernel
+@kernel(is_inner=True)
 def _count_done_neighbours(done, y, x):
     h, w = done.shape
     n = 0

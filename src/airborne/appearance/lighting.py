@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from airborne.kernels import kernel
+from airborne.kernels.arrays import solve_positive
 from airborne.rendering.srgb import light_from_srgb
 
 LIGHT_FROM_SRGB = light_from_srgb(np.arange(1024) * (255 / 1023)).astype(np.float32)
@@ -103,42 +104,20 @@ def fit_light(observed, part, normals, albedo, cloth, coefficients, iterations, 
             normal_matrix[0, 0] += 1e-9
             for p in range(1, LIGHT_TERMS):
                 normal_matrix[p, p] += _RIDGE * trace + 1e-9
-            _solve(normal_matrix, right)
+            solve_positive(normal_matrix, right)
             for p in range(LIGHT_TERMS):
                 coefficients[k, p] = right[p]
     return sd
 
 
 @kernel(fastmath=True, is_inner=True)
-def _solve(A, b):
-    """Overwrite b (n,) with the solution of A x = b, A (n, n) positive definite by its lower triangle: Cholesky."""
-    n = len(b)
-    for j in range(n):
-        for k in range(j):
-            A[j, j] -= A[j, k] * A[j, k]
-        A[j, j] = np.sqrt(A[j, j])
-        for i in range(j + 1, n):
-            for k in range(j):
-                A[i, j] -= A[i, k] * A[j, k]
-            A[i, j] /= A[j, j]
-    for i in range(n):
-        for k in range(i):
-            b[i] -= A[i, k] * b[k]
-        b[i] /= A[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            b[i] -= A[k, i] * b[k]
-        b[i] /= A[i, i]
-
-
-@kernel(fastmath=True)
 def _region_coordinates(part, y, x):
     """Return a pixel's coordinates in its region, -1 to 1 in both directions."""
     h, w = part.shape
     return np.float32(2) * x / w - np.float32(1), np.float32(2) * y / h - np.float32(1)
 
 
-@kernel(fastmath=True)
+@kernel(fastmath=True, is_inner=True)
 def _is_surrounded(part, cloth, normals, y, x):
     """Say whether the four neighbours show the same cloth, facing nearly the same way."""
     h, w = part.shape

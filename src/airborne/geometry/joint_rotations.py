@@ -91,7 +91,7 @@ def rotation_vectors_between(earlier, later):
     return out
 
 
-@kernel
+@kernel(is_inner=True)
 def _matrix(angles, R):
     cx, sx = math.cos(angles[0]), math.sin(angles[0])
     cy, sy = math.cos(angles[1]), math.sin(angles[1])
@@ -101,7 +101,7 @@ def _matrix(angles, R):
     R[2, 0], R[2, 1], R[2, 2] = sx * sz - cx * sy * cz, sx * cz + cx * sy * sz, cx * cy
 
 
-@kernel
+@kernel(is_inner=True)
 def _exponential(vector, R):
     angle2 = vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2
     angle = math.sqrt(angle2)
@@ -115,7 +115,7 @@ def _exponential(vector, R):
     R[1, 2], R[2, 1] = c * y * z - s * x, c * y * z + s * x
 
 
-@kernel
+@kernel(is_inner=True)
 def _logarithm(R, vector):
     """Fill the rotation vector of R through its quaternion, whose largest component is found without cancellation."""
     w = 1 + R[0, 0] + R[1, 1] + R[2, 2]
@@ -138,7 +138,7 @@ def _logarithm(R, vector):
     vector[0], vector[1], vector[2] = scale * x, scale * y, scale * z
 
 
-@kernel
+@kernel(is_inner=True)
 def _angles_near(R, near, out):
     """Fill the angles of R on the branch nearest to `near` (3,); where y is +-90 degrees, x keeps its value."""
     cosine = math.hypot(R[1, 2], R[2, 2])
@@ -160,7 +160,7 @@ def _angles_near(R, near, out):
         out[0], out[1], out[2] = one0, one1, one2
 
 
-@kernel
+@kernel(is_inner=True)
 def _nearest_equivalent(angle, near):
     """Return the angle plus the whole revolutions that bring it nearest to another."""
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))

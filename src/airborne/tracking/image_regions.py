@@ -106,7 +106,7 @@ def _bounding_points(geometry, R, t):
     return points
 
 
-@kernel
+@kernel(is_inner=True)
 def _place(R, t, segment, local, point):
     for i in range(3):
         a, b, c = R[segment, i, 0], R[segment, i, 1], R[segment, i, 2]

@@ -115,7 +115,7 @@ def _convert(
             rgb[row, i, 0], rgb[row, i, 1], rgb[row, i, 2] = red[i], green[i], blue[i]
 
 
-@kernel
+@kernel(is_inner=True)
 def _chroma_rows(row: int, n: int, siting: tuple[int, int], rows_per_chroma: int) -> tuple[int, int, np.float32]:
     """Return the two rows of chroma around a row of luma, and the second one's share."""
     if rows_per_chroma == 1:
@@ -124,7 +124,7 @@ def _chroma_rows(row: int, n: int, siting: tuple[int, int], rows_per_chroma: int
     return j, min(max(j + 2 * is_odd - 1, 0), n - 1), np.float32(siting[is_odd] / 4)
 
 
-@kernel
+@kernel(is_inner=True)
 def _interpolate_chroma(
     near: NDArray[np.uint8],
     far: NDArray[np.uint8],

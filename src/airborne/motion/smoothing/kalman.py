@@ -207,7 +207,7 @@ def _filter_kernel(
     return before, P_before, after, P_after, squares, logs
 
 
-@kernel
+@kernel(is_inner=True)
 def _predict_mean(F: Array, mean: Array) -> Array:
     predicted = np.zeros_like(mean)
     for a in range(len(mean)):
@@ -216,7 +216,7 @@ def _predict_mean(F: Array, mean: Array) -> Array:
     return predicted
 
 
-@kernel
+@kernel(is_inner=True)
 def _predict_covariance(F: Array, P: Array, Q: Array) -> Array:
     """Return F P F' + Q."""
     d = len(P)

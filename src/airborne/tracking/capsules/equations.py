@@ -82,7 +82,7 @@ def accumulate_equations(state, n_free, images, owned, equations):
     return total
 
 
-@kernel
+@kernel(is_inner=True)
 def _chain_to_world(ends, discs, depth, camera, g, H, capsule_gradient, capsule_curvature, offset_gradient):
     """Chain a capsule's gradient (7,) and curvature (7, 7) by its discs and share to its parameters in the world.
 
@@ -116,7 +116,7 @@ def _chain_to_world(ends, discs, depth, camera, g, H, capsule_gradient, capsule_
             offset_gradient[p, k] = px_per_m * (HJ[p, k] + HJ[p + 3, k])
 
 
-@kernel
+@kernel(is_inner=True)
 def _differentiate(state, points, ends, end_radii, share, jacobian, capsule_jacobian):
     """Fill the Jacobians of points (27, n_free) and capsules (10, 9, n_free) by the first numbers of a state."""
     n, n_free = N_CAPSULES, jacobian.shape[1]

@@ -136,7 +136,7 @@ def _row_interval(top, bottom, y):
     return top if y - 1 < top else y - 0.5, bottom if y + 1 > bottom else y + 0.5
 
 
-@kernel
+@kernel(is_inner=True)
 def _edge_derivative(discs, tangents, who, piece, y, outward):
     """Differentiate an end of a span of capsule `who` by its discs: (x0, x1, t, by_y, by_r).
 
@@ -160,7 +160,7 @@ def _edge_derivative(discs, tangents, who, piece, y, outward):
     return cx + outward * h_top, cx + outward * h_bottom, float(piece), -outward * (h_bottom - h_top), by_r
 
 
-@kernel
+@kernel(is_inner=True)
 def _add_edge(discs, tangents, edge, ox, map_0, map_1, border, gradient, curvature):
     """Add the derivatives at the end of a span by its capsule's discs; ox is the region's first column.
 
@@ -208,7 +208,7 @@ def _is_level(tangent):
     return abs(tangent[6] - tangent[0]) > _LEVEL_RATIO * abs(tangent[2] - tangent[1])
 
 
-@kernel
+@kernel(is_inner=True)
 def _add_level_edges(discs, share, tangents, classes, sums, contrast, nearer, origin, out, gradient, curvature):
     """Correct the sums along a capsule's level tangents column by column, and add their derivatives.
 
@@ -255,7 +255,7 @@ def _add_level_edges(discs, share, tangents, classes, sums, contrast, nearer, or
                     _accumulate(-m, 1.0, 1 / ny, t, outward * step * value, facing, gradient[i], curvature[i])
 
 
-@kernel
+@kernel(is_inner=True)
 def _is_occluded(nearer, u, row):
     """Return whether a nearer capsule covers a point of a row."""
     order, i, first, last, x = nearer
@@ -267,7 +267,7 @@ def _is_occluded(nearer, u, row):
     return False
 
 
-@kernel
+@kernel(is_inner=True)
 def _add_border(disc, share, maps, contrast, nearer, origin, gradient, curvature):
     """Add the derivatives of the border across a capsule as it moves along the axis."""
     ux, uy = disc[1, 0] - disc[0, 0], disc[1, 1] - disc[0, 1]

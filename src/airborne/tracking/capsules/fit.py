@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from airborne.kernels import kernel
-from airborne.kernels.arrays import add, assign
+from airborne.kernels.arrays import add, assign, solve_positive
 from airborne.tracking.capsules.equations import N_CAPSULES, N_POINTS, accumulate_equations, classes_with
 from airborne.tracking.capsules.jumper import FOOT_HEIGHT_M, LIMITS_RAD, N_DOF
 from airborne.tracking.capsules.kernel_arguments import Capsules, Equations, Images, SummedMaps, Workspace
@@ -164,7 +164,8 @@ def _maximise(best, trial, priors, images, weight, most_steps):
         damped = best.information.copy()
         for k in range(n):
             damped[k, k] += damping * damped[k, k]
-        step = np.linalg.solve(damped, best.gradient)
+        step = best.gradient.copy()
+        solve_positive(damped, step)
         assign(trial.state, best.state)
         add(trial.state[:n], step)
         _evaluate(trial, priors, images, weight)
@@ -179,7 +180,7 @@ def _maximise(best, trial, priors, images, weight, most_steps):
     return best
 
 
-@kernel
+@kernel(is_inner=True)
 def _evaluate(iterate, priors, images, weight):
     """Evaluate the evidence at an iterate's state, add the priors, and fill the rest of the iterate."""
     anchors, anchor_sd_m = priors.anchors, priors.anchor_sd_m

@@ -85,7 +85,7 @@ def pose_capsules(pose, lengths, radii, points, ends, end_radii):
         _pose_leg(pose, lengths, radii, side, pelvis, points, ends, end_radii)
 
 
-@kernel
+@kernel(is_inner=True)
 def _pose_leg(pose, lengths, radii, side, pelvis, points, ends, end_radii):
     first, c = 8 + 5 * side, 4 + 3 * side
     R, thigh, shank = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))

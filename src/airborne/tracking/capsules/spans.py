@@ -87,7 +87,7 @@ def contrast_at(contrast, class_0, class_1, edge, border):
     return contrast[class_0] if (edge < cut) == (split > 0) else contrast[class_1]
 
 
-@kernel
+@kernel(is_inner=True)
 def add_span(map_0, map_1, at, end, border, out):
     """Add the sums and the areas from `at` to `end` of a row of cumulative sums to out (2, 2)."""
     cut, weight, split = border
@@ -108,7 +108,7 @@ def add_span(map_0, map_1, at, end, border, out):
     out[j, 1] += end - middle
 
 
-@kernel
+@kernel(is_inner=True)
 def merge_span(taken_x, taken_by, taken, a, b, owner):
     """Merge a span into the ordered, disjoint ones taken so far, each end with its owner; return their number."""
     left_by, right_by, n = owner, owner, 0
