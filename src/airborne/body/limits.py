@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airborne.geometry.joint_rotations import fill_exponential, fill_rotation
 from airborne.geometry.rotations import angles_from_matrix, matrix_from_angles
-from airborne.geometry.swing_twist import rotation_of, swing_twist_from_matrix
+from airborne.geometry.swing_twist import fill_swing_twist, rotation_of, swing_twist_from_matrix
 from airborne.kernels import kernel
 from airborne.types import Array
 
@@ -86,6 +87,15 @@ class JointLimits:
         _bound(bounded.reshape(-1, 3), half, np.ascontiguousarray(self.is_ball).reshape(-1))
         return bounded
 
+    def move(self, angles: Array, rotation_vectors: Array) -> tuple[Array, Array]:
+        """Return where joints of x-y-z angles (joints, 3) are after rotations about their own axes (joints, 3) [rad].
+
+        Their coordinates (joints, 3), and the nearest ones within the limits, which are those of all joints.
+        """
+        half, is_ball = np.ascontiguousarray(self.half_rad, float), np.ascontiguousarray(self.is_ball)
+        vectors = np.ascontiguousarray(rotation_vectors, float)
+        return _move(self.centre, half, is_ball, np.ascontiguousarray(angles, float), vectors)
+
     def excess(self, R: Array) -> Array:
         """Return how far rotations (..., 3, 3) lie beyond the limits, along each coordinate: (..., 3) [rad]."""
         coordinates = self.coordinates(R)
@@ -111,14 +121,42 @@ class JointLimits:
 def _bound(coordinates, half, is_ball):
     """Bound coordinates (n, 3), of the joints again and again: half (joints, 3), is_ball (joints,)."""
     for n in range(len(coordinates)):
-        k, reach = n % len(half), 1.0
-        if is_ball[k]:
-            reach = max(math.hypot(coordinates[n, 0] / half[k, 0], coordinates[n, 1] / half[k, 1]), 1.0)
-        for axis in range(3):
-            if axis < 2 and is_ball[k]:
-                coordinates[n, axis] /= reach
-            else:
-                coordinates[n, axis] = min(max(coordinates[n, axis], -half[k, axis]), half[k, axis])
+        k = n % len(half)
+        _bound_joint(coordinates[n], half[k], is_ball[k])
+
+
+@kernel(is_inner=True)
+def _bound_joint(coordinates, half, is_ball):
+    """Bound the coordinates (3,) of one joint."""
+    reach = max(math.hypot(coordinates[0] / half[0], coordinates[1] / half[1]), 1.0) if is_ball else 1.0
+    for axis in range(3):
+        if axis < 2 and is_ball:
+            coordinates[axis] /= reach
+        else:
+            coordinates[axis] = min(max(coordinates[axis], -half[axis]), half[axis])
+
+
+@kernel
+def _move(centre, half, is_ball, angles, rotation_vectors):
+    """Return coordinates and bounds as `JointLimits.move`."""
+    after, bound = np.empty_like(angles), np.empty_like(angles)
+    first, turn, relative = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    for k in range(len(angles)):
+        fill_rotation(angles[k], first)
+        fill_exponential(rotation_vectors[k], turn)
+        for a in range(3):
+            for b in range(3):
+                relative[a, b] = 0.0
+                for c in range(3):
+                    inside = (
+                        centre[k, 0, a] * first[0, c] + centre[k, 1, a] * first[1, c] + centre[k, 2, a] * first[2, c]
+                    )
+                    relative[a, b] += inside * turn[c, b]
+        fill_swing_twist(relative, after[k])
+        for a in range(3):
+            bound[k, a] = after[k, a]
+        _bound_joint(bound[k], half[k], is_ball[k])
+    return after, bound
 
 
 FREE = JointLimits(np.eye(3), np.full(3, np.inf), np.asarray(False))  # a joint without limits

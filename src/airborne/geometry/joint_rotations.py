@@ -22,7 +22,7 @@ def move_matrix(matrix, translation, rotation_vector):
     The result is brought back to a rotation, so that rounding does not grow from frame to frame.
     """
     T, R, moved = np.empty((3, 3)), np.empty((3, 3)), np.eye(4)
-    _exponential(rotation_vector, T)
+    fill_exponential(rotation_vector, T)
     for a in range(3):
         moved[a, 3] = matrix[a, 3] + translation[a]
         for b in range(3):
@@ -53,7 +53,7 @@ def rotations_of(angles):
     """Return the rotations Rx Ry Rz (n, 3, 3) of angles (n, 3) [rad]."""
     R = np.empty((len(angles), 3, 3))
     for j in range(len(angles)):
-        _matrix(angles[j], R[j])
+        fill_rotation(angles[j], R[j])
     return R
 
 
@@ -65,8 +65,8 @@ def compose_rotation_vectors(angles, rotation_vectors):
     """
     out, R, T, product = np.empty_like(angles), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for j in range(len(angles)):
-        _matrix(angles[j], R)
-        _exponential(rotation_vectors[j], T)
+        fill_rotation(angles[j], R)
+        fill_exponential(rotation_vectors[j], T)
         for a in range(3):
             for b in range(3):
                 product[a, b] = R[a, 0] * T[0, b] + R[a, 1] * T[1, b] + R[a, 2] * T[2, b]
@@ -82,8 +82,8 @@ def rotation_vectors_between(earlier, later):
     """
     out, A, B, product = np.empty_like(earlier), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for j in range(len(earlier)):
-        _matrix(earlier[j], A)
-        _matrix(later[j], B)
+        fill_rotation(earlier[j], A)
+        fill_rotation(later[j], B)
         for a in range(3):
             for b in range(3):
                 product[a, b] = A[0, a] * B[0, b] + A[1, a] * B[1, b] + A[2, a] * B[2, b]
@@ -92,7 +92,8 @@ def rotation_vectors_between(earlier, later):
 
 
 @kernel(is_inner=True)
-def _matrix(angles, R):
+def fill_rotation(angles, R):
+    """Fill in the rotation Rx Ry Rz (3, 3) of angles (3,) [rad]."""
     cx, sx = math.cos(angles[0]), math.sin(angles[0])
     cy, sy = math.cos(angles[1]), math.sin(angles[1])
     cz, sz = math.cos(angles[2]), math.sin(angles[2])
@@ -102,7 +103,8 @@ def _matrix(angles, R):
 
 
 @kernel(is_inner=True)
-def _exponential(vector, R):
+def fill_exponential(vector, R):
+    """Fill in the rotation (3, 3) of a rotation vector (3,) [rad]."""
     angle2 = vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2
     angle = math.sqrt(angle2)
     small = angle < _SMALL

@@ -34,9 +34,15 @@ def _swing(R):
 @kernel
 def _fill_coordinates(R, out):
     for n in range(len(R)):
-        _, scale = _swing(R[n])
-        out[n, 0], out[n, 1] = -scale * R[n, 1, 2], scale * R[n, 0, 2]
-        out[n, 2] = math.atan2(R[n, 1, 0] - R[n, 0, 1], R[n, 0, 0] + R[n, 1, 1])
+        fill_swing_twist(R[n], out[n])
+
+
+@kernel(is_inner=True)
+def fill_swing_twist(R, out):
+    """Fill in the coordinates (3,) [rad] of a rotation (3, 3)."""
+    _, scale = _swing(R)
+    out[0], out[1] = -scale * R[1, 2], scale * R[0, 2]
+    out[2] = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
 
 
 def rotation_of(coordinates: Array) -> Array:

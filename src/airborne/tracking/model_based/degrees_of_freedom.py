@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel, Pose, PosedBody
 from airborne.body.chain import angles_of, delta_between, move_pose, segment_jacobians, separation_rows
 from airborne.body.contact import contact_model, overlaps
-from airborne.geometry.joint_rotations import compose_rotation_vectors, rotations_of
+from airborne.geometry.joint_rotations import rotations_of
 from airborne.geometry.swing_twist import swing_twist_from_matrix, swing_twist_jacobian
 from airborne.tracking.evidence import PoseEvidence
 from airborne.types import Array
@@ -127,10 +127,8 @@ class DegreesOfFreedom:
         if not self.moves_joints or not limits.is_limited.any():
             return np.zeros((0, len(self.columns))), np.zeros(0)
         angles = angles_of(pose, self.model.n_joints)
-        moved = compose_rotation_vectors(angles, self.embed(delta)[6:].reshape(-1, 3))
-        after = limits.coordinates(rotations_of(moved))
-        bound = limits.nearest(after)
-        beyond = np.linalg.norm(after - bound, axis=1)
+        after, bound = limits.move(angles, self.embed(delta)[6:].reshape(-1, 3))
+        beyond = np.sqrt(np.square(after - bound).sum(axis=1))
         joints = np.flatnonzero(beyond > _BEYOND_RAD)
         if not len(joints):
             return np.zeros((0, len(self.columns))), np.zeros(0)

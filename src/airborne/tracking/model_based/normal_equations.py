@@ -34,7 +34,7 @@ def prepare_rows(observed: Array, background: Array, certainty: Array, compariso
     the certainty, and the robust squared residual where no body is, with room for LANES pixels after the last.
     """
     c, h, w = observed.shape
-    rows = np.zeros((h, 2 * c + 2, w + LANES), np.float32)
+    rows = np.empty((h, 2 * c + 2, w + LANES), np.float32)
     taps, inverse_clip2 = (comparison.taps_u, comparison.taps_v), np.float32(1 / comparison.clip**2)
     _fill_rows(observed, background, certainty, *taps, inverse_clip2, rows)
     return Observation(observed, background, certainty, rows)
@@ -51,6 +51,11 @@ def _fill_rows(observed, background, certainty, taps_u, taps_v, inverse_clip2, r
     blur_planes(sharp, taps_u, taps_v, blurred)
     for y in range(h):
         cost = rows[y, 2 * c + 1]
+        for x in range(w):
+            cost[x] = 0
+        for k in range(2 * c + 2):
+            for x in range(w, w + LANES):
+                rows[y, k, x] = 0
         for k in range(c):
             for x in range(w):
                 rows[y, k, x] = blurred[k, y, x]
