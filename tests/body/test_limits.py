@@ -57,3 +57,11 @@ def test_ranges_of_angles_become_limits_with_the_same_middle_and_width():
     assert hip.is_ball
     for flexion in (-110, 0, 20):
         assert hip.slack(matrix_from_angles(np.radians([flexion, -10, 10]))) > -np.radians(1)
+
+
+def test_joints_move_about_their_own_axes_to_the_coordinates_of_their_rotations():
+    angles, vectors = np.random.default_rng(2).normal(0, 0.8, (2, 17, 3))
+    moved = matrix_from_angles(angles) @ Rotation.from_rotvec(vectors).as_matrix()
+    after, bound = BODY.move(angles, vectors)
+    np.testing.assert_allclose(after, BODY.coordinates(moved), atol=ROUNDTRIP)
+    np.testing.assert_allclose(bound, BODY.nearest(after), atol=ROUNDTRIP)

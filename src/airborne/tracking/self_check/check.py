@@ -35,7 +35,7 @@ from airborne.types import Array, Image
 from airborne.video import Frames
 
 _MOST_MOMENTS = 16  # at which silhouettes are registered
-_N_THREADS = min(os.cpu_count() or 1, 4)  # register silhouettes; OpenCV lets go of Python's lock, half of the time
+_N_THREADS = min(os.cpu_count() or 1, 4)  # register silhouettes; kernels and OpenCV let go of Python's lock
 _FEWEST_MOMENTS = 3  # with fewer, nothing is said of causes
 
 STAYED = (
