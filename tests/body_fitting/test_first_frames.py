@@ -9,7 +9,7 @@ import pytest
 
 from airborne.body import ATHLETE, SAMPLED, human18
 from airborne.body_fitting.first_frames import fit_preset
-from airborne.run import body
+from airborne.run import body, preset_shape
 from airborne.run.body import BodyRun
 from airborne.tracking.estimate import Status, lost_estimate
 from airborne.tracking.image_regions import reduce_frames
@@ -65,7 +65,7 @@ def test_person_who_is_uncertain_in_the_first_frame_is_fitted_in_those_after(mon
             status, pose = Status.TRACKED if each.index else Status.UNCERTAIN, moving(each.time_s)
             yield each, replace(lost_estimate(each.index, each.time_s), status=status, pose=pose)
 
-    monkeypatch.setattr(body, "track_frames", track)
+    monkeypatch.setattr(preset_shape, "track_frames", track)
     monkeypatch.setattr(body, "keys_of_frames", lambda trial, model, recording: ({9: model}, []))
     trial = SimpleNamespace(body=SimpleNamespace(preset="human18", mass_kg=MASS_KG), settings=Settings())
     run = BodyRun(trial, Clip(), None, DRESSED, POSE)._fit_shape(SCENE.frames(0))
