@@ -121,7 +121,8 @@ def _fill_depths(
     away, slope = np.empty(3), np.empty(3)
     for k in range(len(spheres)):
         m, e = spheres[k], ellipsoids[k]
-        a, b, least, farthest = own[m], other[e], np.inf, radius[m] + semi_axes[e].max()
+        a, b, least, farthest = own[m], other[e], np.inf, radius[m]
+        farthest += max(semi_axes[e, 0], semi_axes[e, 1], semi_axes[e, 2])
         for i in range(3):
             centre[k, i], away[i] = t[a, i], t[a, i] - t[b, i]
             for j in range(3):

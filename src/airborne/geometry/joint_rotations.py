@@ -21,7 +21,8 @@ def move_matrix(matrix, translation, rotation_vector):
 
     The result is brought back to a rotation, so that rounding does not grow from frame to frame.
     """
-    T, R, moved = np.empty((3, 3)), np.empty((3, 3)), np.eye(4)
+    T, R, moved = np.empty((3, 3)), np.empty((3, 3)), np.zeros((4, 4))
+    moved[3, 3] = 1.0
     fill_exponential(rotation_vector, T)
     for a in range(3):
         moved[a, 3] = matrix[a, 3] + translation[a]

@@ -40,8 +40,8 @@ def project_with_jacobian(
     """
     n = len(world)
     shapes = (n, 3, 3), (n, 3), (n, 12), (n, 3)
-    arrays = [
-        np.ascontiguousarray(np.broadcast_to(each, shape), np.float64)
+    arrays = [  # copies, as the kernel is compiled once more for arrays that cannot be written
+        np.array(np.broadcast_to(each, shape), np.float64, order="C")
         for each, shape in zip((R, centre, intrinsics, world), shapes, strict=True)
     ]
     return _linearise(*arrays, np.ascontiguousarray(is_fisheye))
@@ -91,7 +91,7 @@ def _distort(xy: Array, terms: Array, is_fisheye: NDArray[np.bool_]) -> Array:
 def _linearise(R, centre, intrinsics, world, is_fisheye):
     """Return pixels and derivatives as `project_with_jacobian`."""
     n = len(world)
-    px, by_camera, by_world = np.full((n, 2), np.nan), np.zeros((n, 2, N_PARAMETERS)), np.zeros((n, 2, 3))
+    px, by_camera, by_world = np.empty((n, 2)), np.zeros((n, 2, N_PARAMETERS)), np.zeros((n, 2, 3))
     xyz, distorted, by_xy, by_terms, by_xyz = np.empty(3), np.empty(2), np.empty((2, 2)), np.empty((2, 8)), np.empty(3)
     for k in range(n):
         for i in range(3):
@@ -99,6 +99,7 @@ def _linearise(R, centre, intrinsics, world, is_fisheye):
             for j in range(3):
                 xyz[i] += R[k, i, j] * (world[k, j] - centre[k, j])
         if xyz[2] <= _NEAREST_DEPTH_M:
+            px[k, 0] = px[k, 1] = np.nan
             continue
         x, y = xyz[0] / xyz[2], xyz[1] / xyz[2]
         if is_fisheye[k]:

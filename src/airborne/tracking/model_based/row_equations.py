@@ -53,7 +53,7 @@ def add_rows(lit, flat, maps, owner, nearness, projection, observation, comparis
     n = width * (2 + 2 * c)
     ring, blurred, middle = np.zeros((RING, n), np.float32), np.zeros(3 * n, np.float32), np.empty(n, np.float32)
     shape, terms, near = np.zeros(3 * width, np.float32), np.empty(TERM_PLANES, np.float32), np.zeros(STRIP, np.float32)
-    own, segments = np.full(STRIP, -1, np.int16), np.zeros(len(sums.A) * SUM_PLANES, np.float32)
+    own, segments = np.empty(STRIP, np.int16), np.zeros(len(sums.A) * SUM_PLANES, np.float32)
     given, scale, inverse_clip2 = rows.ravel(), _scale(projection), f4(1.0 / comparison.clip**2)
     cost, total, weight, last_block = 0.0, 0.0, 0.0, (blocks.shape[0] - 1, blocks.shape[1] - 1)
     for y in range(y0 - 1 - RADIUS_PX, y1 + 1 + RADIUS_PX):
@@ -120,8 +120,10 @@ def _columns_of_mask(part):
 def _columns_to_compare(firsts, lasts, part):
     """Return the columns of each row that the blurred body changes, off the border, and the box around them."""
     h, w = part.shape
-    lows, highs = np.full(h, w, np.int32), np.zeros(h, np.int32)
+    lows, highs = np.empty(h, np.int32), np.zeros(h, np.int32)
     x0, x1, y0, y1 = w, 0, h, 0
+    for y in range(h):
+        lows[y] = w
     for y in range(1, h - 1):
         low, high = np.int32(w), np.int32(0)
         for v in range(max(y - RADIUS_PX, 0), min(y + RADIUS_PX + 1, h)):
