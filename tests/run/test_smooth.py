@@ -97,7 +97,7 @@ def test_events_of_players_are_found_unless_given(tmp_path):
 
 def test_without_a_way_it_is_the_kalman_smoother_and_says_so(run, tmp_path, capsys):
     assert in_process("smooth", run, "-o", tmp_path / "plain") == 0
-    assert "no method was chosen" in capsys.readouterr().err
+    assert "no method was given" in capsys.readouterr().err
     assert in_process("smooth", run, "--kalman", "-o", tmp_path / "kalman") == 0
     assert "no method" not in capsys.readouterr().err
     plain, kalman = (sorted((tmp_path / each).rglob("*.csv")) for each in ("plain", "kalman"))

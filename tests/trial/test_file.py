@@ -175,8 +175,12 @@ def test_bundled_example_is_a_good_trial(thrown_cross):
         ('file = "body.toml"', 'file = "body.toml"\npreset = "human18"', "body: give file"),
         ('file = "body.toml"', "", 'body: give file = "...", preset = "human18" or measurements = "...", one of them'),
         ('file = "body.toml"', 'preset = "human19"', "body.preset"),
-        ('file = "body.toml"', 'preset = "human18"\nstature_m = 1.8', "stature_m and mass_kg go with a preset, both"),
-        ('file = "body.toml"', 'file = "body.toml"\nmass_kg = 70', "stature_m and mass_kg go with a preset"),
+        ('file = "body.toml"', 'preset = "human18"\nstature_m = 1.8', "needs stature_m and mass_kg; add mass_kg"),
+        (
+            'file = "body.toml"',
+            'file = "body.toml"\nmass_kg = 70',
+            'go with preset = "human18" alone',
+        ),
         ('file = "body.toml"', 'preset = "human18"\nstature_m = -1\nmass_kg = 70', "body.stature_m"),
         (
             'file = "body.toml"',

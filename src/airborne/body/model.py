@@ -126,7 +126,7 @@ class Pose:
         """Translate by (3,) [m] and rotate about the root by a rotation vector (3,) [rad], both in world axes."""
         translation, vector = np.ascontiguousarray(translation_m, float), np.ascontiguousarray(rotation_vector, float)
         moved = move_matrix(self.world_from_root.as_matrix(), translation, vector)
-        return replace(self, world_from_root=RigidTransform(moved, normalize=False))
+        return Pose(world_from_root=RigidTransform(moved, normalize=False), joint_angles=self.joint_angles)
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,7 +76,7 @@ def new_command(
         str, typer.Option(help="The calibration, or a .csv of control points, from the output.")
     ] = "calib.toml",
     body: Annotated[
-        str, typer.Option(help="The body file, likewise; may hold {athlete}. Of players: legs.")
+        str, typer.Option(help="The body file, likewise; may hold {athlete}. Or human18, legs of players.")
     ] = "body.toml",
 ) -> None:
     """Write a session and its trials from a folder of videos, for `airborne batch`; files that exist are left alone.

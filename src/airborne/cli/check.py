@@ -37,7 +37,8 @@ def check_command(
         for line in checks.doubts:
             errors.print(f"airborne: doubt: {line}", style="yellow", markup=False)
         if checks.mistakes and checks.well:
-            errors.print("the other checks run once these are corrected", style="dim")
+            corrected = "this is" if len(checks.mistakes) == 1 else "these are"
+            errors.print(f"the other checks run once {corrected} corrected", style="dim")
         elif checks.doubts and not checks.mistakes:
             print(f"{count(len(checks.doubts), 'doubt')}: frames may come out uncertain or lost")
         elif not checks.mistakes:

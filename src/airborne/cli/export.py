@@ -16,7 +16,8 @@ def export_command(
     results: Annotated[Path, typer.Argument(help="Folder of a run, finished or not.")],
     *,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the files; the run's folder `export`.")
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the files; by default `export` inside the run's folder."),
     ] = None,
     c3d: Annotated[bool, typer.Option("--c3d", help="Markers for Visual3D, Vicon Nexus, Mokka, ...")] = False,
     trc: Annotated[bool, typer.Option("--trc", help="Markers for OpenSim.")] = False,

@@ -46,7 +46,7 @@ def smooth_command(
 
     note = ""
     if butterworth is None and not (spline or kalman):
-        kalman, note = True, "smoothed with --kalman and the run's own covariances: no method was chosen"
+        kalman, note = True, "no method was given: smoothed with --kalman, by the run's own covariances"
     settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
         done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from airborne.body import BodyModel
 from airborne.errors import ResultError
 from airborne.export import panels
-from airborne.export.palette import STATUS_RGB, hex_colour
+from airborne.export.palette import STATUS_RGB, UNKNOWN_RGB, hex_colour
 from airborne.io.figures import save_png
 from airborne.motion import (
     JointStatus,
@@ -32,8 +32,8 @@ _AXIS_STYLES = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#3333
 JOINT_COLOURS = {
     JointStatus.TRACKED: hex_colour(STATUS_RGB[Status.TRACKED]),
     JointStatus.UNCERTAIN: hex_colour(STATUS_RGB[Status.UNCERTAIN]),
-    JointStatus.UNKNOWN: hex_colour(STATUS_RGB[Status.LOST]),
-    JointStatus.LOST: panels.LOST_STYLE["facecolor"],
+    JointStatus.UNKNOWN: hex_colour(UNKNOWN_RGB),
+    JointStatus.LOST: hex_colour(STATUS_RGB[Status.LOST]),
 }
 _TWO_SD = "± 2 standard deviations; unseen where thinner than the line"
 

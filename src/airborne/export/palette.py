@@ -5,6 +5,7 @@ from __future__ import annotations
 from airborne.tracking import Status
 
 STATUS_RGB = {Status.TRACKED: (0, 158, 115), Status.UNCERTAIN: (230, 159, 0), Status.LOST: (213, 94, 0)}
+UNKNOWN_RGB = (93, 102, 111)  # of a joint that no image shows
 ESTIMATE_RGB = (0, 114, 178)  # the blue of Okabe and Ito, which the colour-blind tell apart
 REFERENCE_RGB = (30, 30, 30)  # nearly black
 SIDE_RGB = {"left": (230, 159, 0), "right": (86, 180, 233)}  # of a person's limbs

@@ -108,9 +108,9 @@ def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
         if facts is not None:
             found[camera.name] = facts
             if facts.n_cut:
-                checks.mistakes.append(
+                checks.doubts.append(
                     f"camera '{camera.name}': {camera.video} is cut off before its last {count(facts.n_cut, 'image')}; "
-                    "copy it again"
+                    "copy it again, or track without them"
                 )
     return found
 

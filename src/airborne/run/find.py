@@ -190,8 +190,9 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
     return UndecidedError(
-        f"{trial.name}: the start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}{sides}, then give "
-        "--take 1 (or another number), or the pose under [start]"
+        f"{trial.name}: the start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}{sides} (where the "
+        "outlines miss the body in one camera, its video may be another's), then give --take 1 (or another number), or "
+        "the pose under [start]"
     )
 
 

@@ -85,8 +85,9 @@ def explain_untracked(
     if _is_most(n):
         return Explanation(
             f"{n} of the first {len(first)} frames are tracked when nothing but them is looked at, with the videos and "
-            "cameras as they are: are the body's size and the calibration right, and the pictures sharp? Look at the "
-            "overlay videos where it goes wrong, and give the pose there by a [[key]]",
+            "cameras as they are: are the body's size and the calibration right, are all videos of this recording, and "
+            "are the pictures sharp? Look at the overlay videos where it goes wrong, and give the pose there by a "
+            "[[key]]",
             False,
         )
     counts = [count_tracked(number, change) for number, change in enumerate(changes, start=1)]

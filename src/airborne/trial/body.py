@@ -33,8 +33,11 @@ class BodyTable(SettingsTable):
         sizes = (self.stature_m, self.mass_kg)
         if self.preset == "legs" and any(size is not None for size in sizes):
             raise ValueError('preset = "legs" takes no stature_m and no mass_kg; remove them')
-        if any(size is None for size in sizes) if self.preset == "human18" else any(size is not None for size in sizes):
-            raise ValueError("stature_m and mass_kg go with a preset, both of them, and with nothing else")
+        if self.preset == "human18" and None in sizes:
+            missing = [name for name in ("stature_m", "mass_kg") if getattr(self, name) is None]
+            raise ValueError(f'preset = "human18" needs stature_m and mass_kg; add {" and ".join(missing)}')
+        if self.preset != "human18" and any(size is not None for size in sizes):
+            raise ValueError('stature_m and mass_kg go with preset = "human18" alone; remove them')
         if self.stature_m is not None and self.mass_kg is not None:
             try:
                 require_athlete(self.stature_m, self.mass_kg)

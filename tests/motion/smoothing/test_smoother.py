@@ -73,6 +73,19 @@ def test_landmarks_and_the_centre_of_mass_are_smoothed():
     assert np.isfinite(result["position_sd"].to_numpy()).all()
 
 
+def test_errors_of_the_centre_of_mass_that_last_all_run_are_not_smoothed_away():
+    _, noisy = swing(sd=0.02)
+    lasting = np.zeros((len(noisy), 6, 6))
+    lasting[:, :3, :3] = 0.03**2 * np.eye(3)
+    alone, with_lasting = (
+        smooth_landmarks(each, BODY, BUTTERWORTH, []).sel(joint=CENTRE_OF_MASS)
+        for each in (noisy, replace(noisy, lasting=lasting))
+    )
+    squares = (each["position_sd"].to_numpy() ** 2 for each in (with_lasting, alone))
+    np.testing.assert_allclose(np.subtract(*squares), 0.03**2, rtol=1e-6)
+    np.testing.assert_array_equal(with_lasting["velocity_sd"], alone["velocity_sd"])
+
+
 def test_joints_are_smoothed_as_rotations_and_their_angles_run_on(tmp_path):
     true, noisy = swing(sd=0.05)
     result = smooth_joint_angles(noisy, BODY, BUTTERWORTH, [])

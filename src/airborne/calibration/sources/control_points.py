@@ -135,7 +135,9 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise CalibrationError(f"{path}, row {line}, column {column}: '{text}' is not a number")
+        raise CalibrationError(
+            f"{path}, row {line}, column {column}: '{text}' is not a number; give one, or delete the row"
+        )
     return value
 
 

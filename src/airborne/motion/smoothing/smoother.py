@@ -34,6 +34,7 @@ from airborne.motion.smoothing import (
     spline_smoother,
 )
 from airborne.motion.smoothing.free_rotation import conserve_momentum
+from airborne.motion.smoothing.segments import finite_rows
 from airborne.types import Array, Progress
 
 _LONGEST_FILL_S = 0.5  # of a gap that may be filled
@@ -91,7 +92,7 @@ class Smoothing:
         )
         spans = boundaries_s if isinstance(boundaries_s, Mapping) else {"": boundaries_s}
         cuts = [f"{name} {', '.join(f'{t:.4f} s' for t in times)}".strip() for name, times in spans.items() if times]
-        ends = f"segments end at {'; '.join(cuts)}" if cuts else "no event splits the motion"
+        ends = f"segments end at {'; '.join(cuts)}" if cuts else "no take-off or landing splits the motion"
         return [f"smoothing: {text}", fill, ends]
 
 
@@ -141,15 +142,22 @@ def smooth_landmarks(
     points, sd, status = known_landmarks(motion, model)
     names = [landmark.name for landmark in model.landmarks]
     covariance = np.where(np.eye(3, dtype=bool), sd[..., None, None] ** 2, 0.0)
+    lasting = None
     if has_inertias(model):
         table = measure_flight(motion, model)
-        com, com_sd = (table[name].transpose("time", "space").to_numpy() for name in ("com", "com_sd_frame"))
+        names_of_com = "com", "com_sd_frame", "com_sd"
+        com, com_sd, whole_sd = (table[name].transpose("time", "space").to_numpy() for name in names_of_com)
+        lasting = whole_sd**2 - com_sd**2
         points = np.concatenate([points, com[:, None]], axis=1)
         diagonal = np.where(np.eye(3, dtype=bool), com_sd[:, None, :] ** 2, 0.0)
         covariance, names = np.concatenate([covariance, diagonal[:, None]], axis=1), [*names, CENTRE_OF_MASS]
         status = np.concatenate([status, motion.status[:, None]], axis=1)
     own = [boundaries_s] * len(names)
     segments = _smooth_points(motion.time_s, points, covariance, smoothing, boundaries_s=own, progress=progress)
+    if lasting is not None:  # errors of the centre of mass that last all run are not smoothed away
+        sd, known = segments.paths.value_sd[:, -1], finite_rows(lasting)
+        usual = np.median(lasting[known], axis=0) if known.any() else np.nan
+        sd[:] = np.sqrt(sd**2 + np.where(known[:, None], lasting, usual))
     coordinates = _coordinates(motion.time_s, motion.index) | {"joint": names, "space": list("xyz")}
     variables = _position_variables(segments, ("time", "joint", "space"), status)
     return xr.Dataset(variables, coordinates, {"history": smoothing.history(boundaries_s)})

@@ -75,8 +75,8 @@ def pose_by_hand(
         angles[joints.index(name)] = np.radians(xyz)
     is_out = np.any(np.abs(model.limits.excess(matrix_from_angles(angles))) > _ROUNDING_RAD, axis=1)
     beyond = [name for name, out in zip(joints, is_out, strict=True) if out and name in joint_angles_deg]
-    notes = (f"{where}.joint_angles_deg: {', '.join(beyond)} beyond the body's joint limits",) if beyond else ()
-    return FirstPose(Pose(world_from_root=world_from_root, joint_angles=angles), notes)
+    note = f"{where}: {', '.join(beyond)} beyond the body's joint limits, within which the fit draws it"
+    return FirstPose(Pose(world_from_root=world_from_root, joint_angles=angles), (note,) if beyond else ())
 
 
 def fit_to_detections(model: BodyModel, rig: Rig, where: str, detections: Detections) -> FirstPose:
