@@ -8,7 +8,7 @@ import pytest
 from airborne.batch.new import write_study
 from airborne.batch.run import plan_tasks
 from airborne.batch.trials import label_names, list_trials
-from airborne.errors import AirborneError
+from airborne.errors import AirborneError, TrialError
 from airborne.trial.file import read_trial
 from airborne.video import VideoWriter
 
@@ -134,6 +134,18 @@ def test_new_writes_one_trial_for_videos_of_players_named_by_their_cameras_alone
     trial = read_trial(study.trials[0])
     assert [camera.name for camera in trial.camera] == ["left", "right"]
     assert trial.calibration.control_points is not None and trial.has_players and trial.start.find
+
+
+def test_new_asks_for_the_size_of_a_person(tmp_path):
+    for name in ("left.mp4", "right.mp4", "points.csv"):
+        write(tmp_path / name, "")
+    study = write_study(tmp_path, "{camera}.mp4", tmp_path, calibration="points.csv", body="human18")
+    assert study.notes == ("session.toml: add stature_m and mass_kg under [body], or in each trial",)
+    with pytest.raises(TrialError, match="needs stature_m and mass_kg"):
+        read_trial(study.trials[0])
+    text = study.session.read_text().replace('"human18"', '"human18"\nstature_m = 1.7\nmass_kg = 65.0')
+    study.session.write_text(text)
+    assert read_trial(study.trials[0]).body.preset == "human18"
 
 
 def test_new_takes_trial_for_the_only_word_beside_the_camera(tmp_path):

@@ -27,7 +27,10 @@ def add(out, values):
 
 @kernel(fastmath=True, is_inner=True)
 def solve_positive(A, b):
-    """Overwrite b (n,) with the solution of A x = b, A (n, n) positive definite by its lower triangle: Cholesky."""
+    """Overwrite b (n,) with the solution of A x = b, and A (n, n) too: by Cholesky.
+
+    A is positive definite, given by its lower triangle.
+    """
     n = len(b)
     for j in range(n):
         for k in range(j):

@@ -41,6 +41,8 @@ from airborne.video import LiveRecording, Outages, Recording
 if TYPE_CHECKING:
     from airborne.run.players import PlayersRun
 
+_SEARCH = "looking for the start"  # a stage
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackResult:
@@ -97,10 +99,11 @@ def track_trial(
     started_s = time.monotonic()
     with sole_writer(folder), ExitStack() as stack:  # from the beginning: to find the start takes its time
         drawn = None if not pictures else "stills" if first_frame else "videos"
-        options = _Options(folder, started_s, resume, overwrite, live, drawn, take, progress, stage_progress)
+        args = folder, started_s, resume, overwrite, live, first_frame, drawn, take
+        options = _Options(*args, progress, stage_progress)
         if trial.has_players:
-            return _run(_open_players(trial, options, stack, first_frame=first_frame), options, stack)
-        return _run(_open_body(trial, options, first_frame=first_frame), options, stack)
+            return _run(_open_players(trial, options, stack), options, stack)
+        return _run(_open_body(trial, options), options, stack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,22 +113,33 @@ class _Options:
     resume: bool
     overwrite: bool
     live: bool
+    first_frame: bool  # is tracked alone
     drawn: OverlaysAs | None  # None: no pictures
     take: int | None  # of the poses that were found
     progress: Progress | None
     stage_progress: StageProgress | None
 
+    def of_stage(self, stage: str) -> Progress | None:
+        """Return what a stage before or after the tracking reports its progress to."""
+        return self.progress if self.stage_progress is None else partial(self.stage_progress, stage)
 
-def _open_body(trial: Trial, options: _Options, *, first_frame: bool) -> BodyRun:
+    def shorten(self, trial: Trial) -> Trial:
+        """Return the trial with the frames that are tracked."""
+        if not self.first_frame:
+            return trial
+        alone = {"start": None, "stop": trial.start.frame + 1}
+        return trial.model_copy(update={"track": trial.track.model_copy(update=alone)})
+
+
+def _open_body(trial: Trial, options: _Options) -> BodyRun:
     """Open a trial of one body, whose start may have to be found."""
     found = None
     if trial.start.find:
         from airborne.run.find import find_start
 
-        looking = _of_stage("looking for the start", options.stage_progress, options.progress)
-        found = find_start(trial, options.folder, take=options.take, progress=looking)
+        found = find_start(trial, options.folder, take=options.take, progress=options.of_stage(_SEARCH))
         trial = found.trial
-    trial = _with_first_frame_alone(trial) if first_frame else trial
+    trial = options.shorten(trial)
     opened = open_trial(trial, None if found is None else found.facts)
     with start_foregrounds(opened.recording) as foregrounds:
         body = BodyRun.open(trial, opened, found)
@@ -133,7 +147,7 @@ def _open_body(trial: Trial, options: _Options, *, first_frame: bool) -> BodyRun
     return body
 
 
-def _open_players(trial: Trial, options: _Options, stack: ExitStack, *, first_frame: bool) -> PlayersRun:
+def _open_players(trial: Trial, options: _Options, stack: ExitStack) -> PlayersRun:
     """Open a trial of players, whose start may have to be found; live cameras stay open for as long as the stack is."""
     from airborne.run.players import PlayersRun
     from airborne.run.players_mix_ups import refuse_players_mix_ups
@@ -142,10 +156,9 @@ def _open_players(trial: Trial, options: _Options, stack: ExitStack, *, first_fr
     if trial.start.find:
         from airborne.run.find_players import find_players_start
 
-        looking = _of_stage("looking for the start", options.stage_progress, options.progress)
-        found = find_players_start(trial, options.folder, take=options.take, progress=looking)
+        found = find_players_start(trial, options.folder, take=options.take, progress=options.of_stage(_SEARCH))
         trial = found.trial
-    trial = _with_first_frame_alone(trial) if first_frame else trial
+    trial = options.shorten(trial)
     facts = None if found is None else found.facts
     opened = _open_live(trial, stack, options.progress) if options.live else open_trial(trial, facts)
     opened.recording.events.extend([] if found is None else [found.note])
@@ -153,11 +166,6 @@ def _open_players(trial: Trial, options: _Options, stack: ExitStack, *, first_fr
     if isinstance(opened.recording, Recording):
         refuse_players_mix_ups(players.starts, opened.recording)
     return players
-
-
-def _with_first_frame_alone(trial: Trial) -> Trial:
-    alone = {"start": None, "stop": trial.start.frame + 1}
-    return trial.model_copy(update={"track": trial.track.model_copy(update=alone)})
 
 
 def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: ExitStack) -> TrackResult:
@@ -172,8 +180,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     subject, delays_s = _track(subject, options, resume=goes_on)
     connection.close()
     tracked_s = time.monotonic()
-    args = options.stage_progress, options.progress
-    motion, summary = subject.finish(folder, options.drawn, lambda stage: _of_stage(stage, *args))
+    motion, summary = subject.finish(folder, options.drawn, options.of_stage)
     summary |= corrections_of(subject.trial, motion.index.tolist())
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += [
@@ -217,11 +224,6 @@ def _read_finished_run(
     motion = (read_motion if table == MOTION else read_players)(folder / table)
     summary = read_summary(folder)
     return TrackResult(motion, summary, was_finished=True) if len(motion) == summary["n_frames"] else None
-
-
-def _of_stage(stage: str, report: StageProgress | None, otherwise: Progress | None) -> Progress | None:
-    """Return what a stage reports its progress to."""
-    return otherwise if report is None else partial(report, stage)
 
 
 def _open_live(trial: Trial, stack: ExitStack, progress: Progress | None) -> Opened[LiveRecording]:
