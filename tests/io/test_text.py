@@ -108,3 +108,16 @@ def test_of_a_table_in_another_form_it_is_said_how_to_save_it(tmp_path, data, sa
 def test_a_cell_may_hold_a_semicolon(tmp_path):
     (tmp_path / "a.csv").write_text("\ufeffpoint,note\na,b;c\n", encoding="utf-8")
     assert read_csv(tmp_path / "a.csv", "", ValueError) == [(1, ["point", "note"]), (2, ["a", "b;c"])]
+
+
+def test_a_file_that_is_replaced_by_a_longer_one_is_read_whole(tmp_path, monkeypatch):
+    path, longer, open_path = tmp_path / "a.toml", tmp_path / "longer.toml", Path.open
+    path.write_text("a = 1\n")
+    longer.write_text("a = [1, 2, 3]\n")
+
+    def replace_and_open(self, *args):
+        longer.replace(path)
+        return open_path(self, *args)
+
+    monkeypatch.setattr(Path, "open", replace_and_open)
+    assert read_toml(path) == {"a": [1, 2, 3]}

@@ -6,6 +6,7 @@ import codecs
 import csv
 import errno
 import json
+import os
 import re
 import stat
 import tomllib
@@ -35,12 +36,11 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
         raise OSError(errno.EISDIR, "it is a folder", str(path))
     if not stat.S_ISREG(status.st_mode):
         raise OSError(errno.EINVAL, "it is not a file", str(path))
-    if status.st_size > most_bytes:
-        raise ValueError(f"larger than {most_bytes / 1e6:g} MB")
-    if status.st_size == 0:  # as the system's own files say, some of which never end
-        return b""
     with path.open("rb") as file:
-        return file.read(status.st_size)
+        size = os.fstat(file.fileno()).st_size  # of this very file: another may have taken its place since
+        if size > most_bytes:
+            raise ValueError(f"larger than {most_bytes / 1e6:g} MB")
+        return file.read(size)  # of the system's own files, some of which never end, nothing: their size is 0
 
 
 def read_text(path: Path, most_bytes: int) -> str:
