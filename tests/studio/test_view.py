@@ -129,7 +129,8 @@ def test_until_a_far_frame_is_decoded_the_key_frame_before_it_is_shown_and_said_
         page.evaluate(HOLD_IMAGES)
         page.evaluate("frame => { document.querySelector('canvas.view').view.go(frame); }", frame)
         page.wait_for_function("document.querySelector('canvas.view').view.coarse !== null")
-        assert read_number(page, B_FRAMES) == 0  # what was in view, below a veil
+        # what was in view, below a veil; to a busy machine's question the key frame has come meanwhile
+        assert read_number(page, B_FRAMES) in (0, index.key_before(picture))
         page.locator("canvas.view[data-coarse-ms]").wait_for()
         assert read_number(page, B_FRAMES) == index.key_before(picture)
         assert page.locator("canvas.view").get_attribute("data-frame") == "0"
