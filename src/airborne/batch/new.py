@@ -21,6 +21,7 @@ _CAMERA = "camera"  # the word of a pattern that tells the videos of a trial apa
 _ALONE = "trial"  # the name of the only trial
 _LEGS = "legs"  # the preset of several players
 _PERSON = "human18"  # that of a person, of whom stature and mass are to be added
+_PRESETS = (_LEGS, _PERSON)
 _WORD = re.compile(r"\{(\w+)\}")
 
 
@@ -89,7 +90,7 @@ def write_study(
     notes += [
         f"{folder / name} is not there yet, but {SESSION} names it: put it there, or give another as --{option}"
         for option, name in (("calibration", calibration), ("body", body))
-        if not (_WORD.search(name) or name in (_LEGS, _PERSON) or (folder / name).is_file())
+        if not (_WORD.search(name) or name in _PRESETS or (folder / name).is_file())
     ]
     if body == _PERSON:
         notes.append(f"{SESSION}: add stature_m and mass_kg under [body], or in each trial")
@@ -136,7 +137,7 @@ def _session_text(cameras: Sequence[Mapping[str, str]], *, calibration: str, bod
         tables.append(tomlkit.item(dict(camera)))
     document["camera"] = tables
     document["calibration"] = {"control_points" if calibration.lower().endswith(".csv") else "file": calibration}
-    document["body"] = {"preset": body} if body in (_LEGS, _PERSON) else {"file": body}
+    document["body"] = {"preset": body} if body in _PRESETS else {"file": body}
     if body == _LEGS:
         document["start"] = {"find": True}
     return tomlkit.dumps(document)

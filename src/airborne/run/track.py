@@ -99,8 +99,9 @@ def track_trial(
     started_s = time.monotonic()
     with sole_writer(folder), ExitStack() as stack:  # from the beginning: to find the start takes its time
         drawn = None if not pictures else "stills" if first_frame else "videos"
-        args = folder, started_s, resume, overwrite, live, first_frame, drawn, take
-        options = _Options(*args, progress, stage_progress)
+        options = _Options(
+            folder, started_s, resume, overwrite, live, first_frame, drawn, take, progress, stage_progress
+        )
         if trial.has_players:
             return _run(_open_players(trial, options, stack), options, stack)
         return _run(_open_body(trial, options), options, stack)

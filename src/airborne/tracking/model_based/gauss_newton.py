@@ -185,7 +185,7 @@ def image_evaluator(
     """
     bodies = [render_model.with_pose(pose) for pose in poses]
     empty_cost = sum(view.buffers.empty_cost for view in views)
-    correlated = correlated_px(views)
+    correlated = _correlated_px(views)
     shape_px = [shape_error_px(view.buffers, bodies[0]) for view in views] if dofs.moves_joints else []
     shared = max(correlated, float(np.mean(shape_px or [0.0])))
 
@@ -221,7 +221,7 @@ def image_evaluator(
     return evaluate, correlated
 
 
-def correlated_px(views: Sequence[ImageView]) -> float:
+def _correlated_px(views: Sequence[ImageView]) -> float:
     """Return how many pixels of the images have their noise in common."""
     return float(np.mean([view.noise_px for view in views] or [NOISE_PX]))
 
@@ -238,7 +238,7 @@ def weigh_images(render_model: RenderModel, poses: Sequence[Pose], views: Sequen
             of_pose += _weigh(render_model, posed, image)
     empty_cost = sum(view.buffers.empty_cost for view in views)
     cost, residual, weight = totals.T
-    noise = correlated_px(views) * np.divide(residual, weight, out=np.ones(len(poses)), where=weight > 0)
+    noise = _correlated_px(views) * np.divide(residual, weight, out=np.ones(len(poses)), where=weight > 0)
     return 0.5 * (cost + empty_cost) / noise.min()
 
 
