@@ -19,4 +19,4 @@ def test_a_body_that_is_a_little_too_large_is_not_called_right(tmp_path, capsys)
     assert in_process("track", trial, "-o", tmp_path / "run", "--no-pictures") == 0
     said = capsys.readouterr().out
     assert "something is wrong" in said
-    assert re.search(r"the body looks 3\.\d ± 0\.\d % smaller than its file says", said)
+    assert re.search(r"the body looks 3\.\d ± 0\.\d % smaller than its model says", said)

@@ -55,7 +55,7 @@ def test_a_start_that_shows_nothing_of_exchanged_videos_says_so(folder):
     aside = "position_m = [0.6, 0.0, 0.5]"  # seen by all cameras; the cross is elsewhere
     checks = check_trial(edit(folder, (position, aside)))
     assert checks.mistakes == []
-    assert checks.well[-1].startswith("videos: what moves at the start does not show whether any were exchanged")
+    assert checks.well[-1].startswith("videos: what moves does not show whether any were exchanged")
 
 
 def test_a_video_that_was_not_copied_whole_says_so(folder):

@@ -104,7 +104,7 @@ def test_a_trial_without_a_start_is_tracked_and_says_how_it_began(path, tmp_path
 def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp_path, monkeypatch, capsys):
     decide = find.find_thing
 
-    def undecided(model, moments):
+    def undecided(model, moments, progress):
         finding = decide(model, moments)
         first = finding.candidates[0]
         other = replace(first, pose=first.pose.move(np.array([0, 0, 0.3]), np.zeros(3)), probability=0.4)
@@ -135,7 +135,7 @@ def test_an_undecided_start_stops_with_its_candidates_and_one_is_taken(path, tmp
 def test_poses_that_disagree_with_what_moves_are_not_called_likely(path, tmp_path, monkeypatch):
     find_thing = find.find_thing
 
-    def disagreeing(model, moments):
+    def disagreeing(model, moments, progress):
         finding = find_thing(model, moments)
         first = replace(finding.candidates[0], is_plausible=False, precision=0.2, recall=0.1)
         return replace(finding, candidates=(first,))

@@ -12,10 +12,11 @@ from typing import TypeVar
 
 from airborne.errors import AirborneError, MistakesError, TrialError, count
 from airborne.run.detections import read_trial_detections
-from airborne.run.find import require_two_cameras
+from airborne.run.find import look_at, require_two_cameras
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import find_undecided_mix_ups, refuse_mix_ups, refuse_same_files, start_foregrounds
+from airborne.run.moving_mix_ups import MovingSilhouettes, refuse_moving_mix_ups
 from airborne.run.opening import (
     Opened,
     dark_start_error,
@@ -27,6 +28,7 @@ from airborne.run.opening import (
 )
 from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
+from airborne.tracking.first_pose.moments import empty_scenes, look
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
@@ -36,9 +38,9 @@ _T = TypeVar("_T")
 _UNEQUAL = 0.05  # chosen: of the first camera's duration; cameras stopped one after the other differ by less
 _DIM_LEVEL = 2 * DARK_LEVEL  # chosen: an image at 6 % of its brightness has no brighter pixel
 _NO_MIX_UP = "videos: no sign at the start that cameras' videos were exchanged"
-_UNDECIDED = (
-    "videos: what moves at the start does not show whether any were exchanged or mirrored; tracking may show it"
-)
+_UNDECIDED = "videos: what moves does not show whether any were exchanged or mirrored; tracking may show it"
+_ONE_BODY = "videos: what moves in them looks like one body seen by all cameras"
+_MOST_IMAGES = 300  # chosen: of each camera that are looked at where no start is given, a few seconds' work
 
 
 class Checks:
@@ -189,6 +191,11 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda: require_two_cameras(trial),
             lambda _: f"start: not given; the {who} looked for when the trial is tracked",
         )
+        if not trial.has_players and len(recording.rig) > 1:
+            seen = checks.attempt(
+                lambda: _look_for_mix_ups(trial, recording), lambda seen: _ONE_BODY if seen.are_one_body else _UNDECIDED
+            )
+            checks.doubts += [seen.question] if seen is not None and seen.question else []
     elif trial.has_players:
         tracker = checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
@@ -223,6 +230,12 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
                     )
     for event in recording.events:
         checks.add(f"note: {event}")
+
+
+def _look_for_mix_ups(trial: Trial, recording: Recording) -> MovingSilhouettes:
+    """Return what the silhouettes of what moves say; raises MistakesError where they speak of a mix-up."""
+    _, sample = look_at(trial, recording, _MOST_IMAGES)
+    return refuse_moving_mix_ups(look(sample, empty_scenes(sample)))
 
 
 def _exists(trial: Trial, name: str | None) -> bool:

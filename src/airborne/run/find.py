@@ -18,6 +18,7 @@ from airborne.export import write_json
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.io.folder_lock import refuse_links
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
+from airborne.run.moving_mix_ups import refuse_moving_mix_ups
 from airborne.run.opening import open_cameras, past_the_end_error, video_source
 from airborne.tracking import Status
 from airborne.tracking.backward import turn_time
@@ -85,12 +86,13 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
             f"{trial.name}: {count(most, 'picture')} of each camera{kind}{masked}: too few to tell the empty scene, "
             f"{FEWEST_PICTURES} at least; give the pose under [start]"
         )
-    search = find_person if model.has_joints else find_thing
-    finding = search(model, look(sample, scenes))
+    moments = look(sample, scenes)
+    silhouettes = refuse_moving_mix_ups(moments)
+    finding = (find_person if model.has_joints else find_thing)(model, moments, progress)
     if take is not None:
         finding = take_candidate(trial, finding, take)
     elif not finding.is_decided:
-        raise _ask_for_help(trial, model, finding, folder)
+        raise _ask_for_help(trial, model, finding, folder, silhouettes.question)
     first = finding.candidates[0]
     frame, pose = _track_back(trial, model, recording, finding)
     pose = least_turned_pose(model, pose)
@@ -118,28 +120,29 @@ def require_two_cameras(trial: Trial) -> None:
 
 def look_through(trial: Trial, progress: Progress | None) -> tuple[Recording, tuple[VideoFacts, ...], list[Frames]]:
     """Open the videos and look at moments spread over them, small; raises TrialError where there are none."""
-    recording, facts = _open_for_look(trial)
+    cameras = open_cameras(trial)
+    sources = [video_source(trial, camera) for camera in trial.camera]
+    recording = open_recording(sources, cameras.rig, facts=cameras.facts, every=trial.track.every)
+    recording, sample = look_at(trial, recording, _MOST_IMAGES, progress)
+    return recording, cameras.facts, sample
+
+
+def look_at(
+    trial: Trial, recording: Recording, most_images: int, progress: Progress | None = None
+) -> tuple[Recording, list[Frames]]:
+    """Look at moments of an opened recording, small; return what of it was looked at, too.
+
+    Images are converted only where they are used. Raises TrialError where there are none.
+    """
+    start = trial.start.frame
+    stop = start + most_images
+    if trial.track.stop is not None:
+        stop = max(min(stop, trial.track.stop), start + 1)
+    recording = replace(recording, start=start, stop=stop, is_lazy=True)
     sample = spread_sample(_report_each(recording, progress), recording.n_frames)
     if not sample:
         raise past_the_end_error(trial, recording)
-    return recording, facts, sample
-
-
-def _open_for_look(trial: Trial) -> tuple[Recording, tuple[VideoFacts, ...]]:
-    """Open the videos for a look: images are converted only where they are used."""
-    cameras = open_cameras(trial)
-    start = trial.start.frame
-    stop = start + _MOST_IMAGES
-    recording = open_recording(
-        [video_source(trial, camera) for camera in trial.camera],
-        cameras.rig,
-        facts=cameras.facts,
-        every=trial.track.every,
-        start=start,
-        stop=stop if trial.track.stop is None else max(min(stop, trial.track.stop), start + 1),
-        lazy=True,
-    )
-    return recording, cameras.facts
+    return recording, sample
 
 
 def _report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
@@ -168,8 +171,8 @@ def open_candidates(folder: Path) -> None:
     refuse_links(folder)
 
 
-def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path) -> UndecidedError:
-    """Write the candidates and return the error that names them."""
+def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path, question: str) -> UndecidedError:
+    """Write the candidates and return the error that names them; it asks what their silhouettes make one ask."""
     from airborne.export.finding import draw_candidates
 
     frame, best = finding.moment.frames.index, finding.candidates[0]
@@ -184,15 +187,15 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
     if not best.is_plausible:
         reason = (
             f"no pose agrees with what moves in frame {frame} (of the likeliest, {best.precision:.0%} of the outline "
-            f"stands out, and covers {best.recall:.0%} of what does); check that each camera has its own video, "
-            "and [calibration] and [body]"
+            f"stands out, and covers {best.recall:.0%} of what does)"
         )
+        question = question or "check that each camera has its own video, and [calibration] and [body]"
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
     return UndecidedError(
-        f"{trial.name}: the start is undecided: {reason}; look at {folder / CANDIDATES_PICTURE}{sides} (where the "
-        "outlines miss the body in one camera, its video may be another's), then give --take 1 (or another number), or "
-        "the pose under [start]"
+        f"{trial.name}: the start is undecided: {'; '.join(filter(None, [reason, question]))}; look at "
+        f"{folder / CANDIDATES_PICTURE}{sides} (where the outlines miss the body in one camera, its video may be "
+        "another's), then give --take 1 (or another number), or the pose under [start]"
     )
 
 

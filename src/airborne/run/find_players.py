@@ -61,7 +61,7 @@ def find_players_start(
     def whole(index: int) -> Frames:
         return next(iter(replace(recording, start=index, stop=index + 1)))
 
-    finding = find_players(sample, whole, near_net=trial.start.near_net)
+    finding = find_players(sample, whole, near_net=trial.start.near_net, progress=progress)
     if take is not None:
         finding = take_candidate(trial, finding, take)
     elif not finding.is_decided:

@@ -24,7 +24,7 @@ from airborne.tracking.first_pose.rigid_search import (
     search_orientations,
 )
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array, Progress
 
 LEAST_PROBABILITY = 0.95  # of the best candidate, with which it is taken
 # throws 1000-1029 of `benchmarks/accuracy/find_start.py`: right bodies had 0.82 and 0.86 at least, others 0.77 at most
@@ -61,7 +61,7 @@ class StartSearch:
         return best.is_plausible and best.probability >= LEAST_PROBABILITY
 
 
-def find_thing(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
+def find_thing(model: BodyModel, moments: Sequence[Moment], progress: Progress | None = None) -> StartSearch:
     """Find a rigid body where something stands out; of several moments, the first that decides. Raises TrialError."""
     thing = Thing(RenderModel.of(model))
     seen = [(moment, find_places(moment, thing.radius_m)) for moment in moments]
@@ -71,7 +71,9 @@ def find_thing(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
             "[start] is missing, and nothing is seen to move in two cameras at once; give the pose under [start]"
         )
     findings = []
-    for moment, places in islice(_best_first(seen), _MOST_MOMENTS):
+    for number, (moment, places) in enumerate(islice(_best_first(seen), _MOST_MOMENTS)):
+        if progress is not None:
+            progress(number, _MOST_MOMENTS)
         findings.append(_find_at(thing, moment, places))
         if findings[-1].is_decided:
             return findings[-1]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import count
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from airborne.tracking.first_pose.person_search import Judge, first_poses, impro
 from airborne.tracking.first_pose.places import Place, find_places
 from airborne.tracking.first_pose.postures import is_person
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array, Progress
 
 _N_MOMENTS = 3  # that are searched a little: about 7 s each
 _N_ROUNDS = 5  # of the best of them, and of the next where it does not decide: about 2 s each
@@ -29,8 +30,14 @@ _LEAST_PRECISION, _LEAST_RECALL = 0.7, 0.7  # of a mask over what stands out, an
 _LEAST_SHOWN = 0.01  # probability of a candidate that is listed
 
 
-def find_person(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
+def find_person(model: BodyModel, moments: Sequence[Moment], progress: Progress | None = None) -> StartSearch:
     """Find a person where something stands out. Raises TrialError."""
+    number, most = count(1), _N_MOMENTS + _MOST_SEARCHED * (_N_ROUNDS + 1)
+
+    def advance() -> None:
+        if progress is not None:
+            progress(next(number), most)
+
     if not is_person(model):
         raise TrialError(
             "[start] is missing; a body with joints is found if its segments are named as those of human18: give "
@@ -44,12 +51,15 @@ def find_person(model: BodyModel, moments: Sequence[Moment]) -> StartSearch:
             "[start] is missing, and nothing is seen to move in two cameras at once; give joints_m, points_px or "
             "detections under [start]"
         )
-    searches = [_search_a_little(person, moment, places[0]) for moment, places in _spread(seen)]
+    searches = []
+    for moment, places in _spread(seen):
+        searches.append(_search_a_little(person, moment, places[0]))
+        advance()
     searches.sort(key=lambda search: -search[0](search[1]).max())
     n_moving = {id(moment): len(places) for moment, places in seen}
     findings = []
     for judge, poses in searches[:_MOST_SEARCHED]:
-        findings.append(StartSearch(judge.moment, _search_on(judge, poses), n_moving[id(judge.moment)]))
+        findings.append(StartSearch(judge.moment, _search_on(judge, poses, advance), n_moving[id(judge.moment)]))
         if findings[-1].is_decided:
             return findings[-1]
     return findings[0]
@@ -77,13 +87,15 @@ def _search_a_little(person: JointedBody, moment: Moment, place: Place) -> tuple
     return judge, improve(judge, poses, n_kept=12, n_moves=64, seed=2)
 
 
-def _search_on(judge: Judge, poses: PoseSet) -> tuple[Candidate, ...]:
-    """Improve poses and polish the best; return the candidates, the likeliest first."""
+def _search_on(judge: Judge, poses: PoseSet, advance: Callable[[], None]) -> tuple[Candidate, ...]:
+    """Improve poses and polish the best, and advance after each; return the candidates, the likeliest first."""
     person = judge.person
     for number in range(_N_ROUNDS):
         poses = improve(judge, poses, n_kept=_N_KEPT, n_moves=128, seed=10 + number, narrower=0.75**number)
+        advance()
     poses = poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _LEAST_APART_M)]
     poses = PoseSet.of([polish(judge, pose) for pose in poses.each()])
+    advance()
     return _candidates(judge, poses[apart(person.landmarks(poses), judge(poses), _N_KEPT, _APART_M)])
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from airborne.appearance.empty_scene import PIXEL_EVIDENCE_LIMIT
 from airborne.cameras import Camera, Rig
 from airborne.tracking.first_pose.moments import Moment
-from airborne.types import Array
+from airborne.types import Array, Mask
 
 _LEAST_SHARE = 1e-4  # of the picture that a region covers
 _MOST_REGIONS = 6  # of a view, the largest
@@ -29,6 +29,8 @@ class MovingRegion:
     centre: Array  # (2,) [px], by evidence
     area_px: float  # of what stands out in it [px]
     is_cut: bool  # by the picture's border
+    corner: tuple[int, int]  # of its box, left and upper [px]
+    mask: Mask  # (h, w) of its box
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +50,7 @@ class Place:
 def find_places(moment: Moment, radius_m: float) -> list[Place]:
     """Find where something as large as a body of this radius may be, in most views and largest first."""
     regions = [
-        [] if view is None or nats is None else _regions(view.camera, nats)
+        [] if view is None or nats is None else moving_regions(view.camera, nats)
         for view, nats in zip(moment.frames.views, moment.evidence, strict=True)
     ]
     seen = [view for view, own in enumerate(regions) if own]
@@ -102,7 +104,8 @@ def _distances_m(camera: Camera, centres: Array, points: Array) -> Array:
     return np.where(depth_m[:, None] > _NEAREST_M, off_m, np.inf)
 
 
-def _regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
+def moving_regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
+    """Return the regions of a view that stand out by their evidence (h, w) [nats], the largest first."""
     is_new = cv2.morphologyEx((nats > 0).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(is_new)
     found = []
@@ -111,12 +114,13 @@ def _regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
         if area < max(_LEAST_SHARE * nats.size, 8):
             continue
         inside = np.s_[y : y + height, x : x + width]
-        weights = np.where(labels[inside] == label, np.maximum(nats[inside], 0), 0)
+        mask = labels[inside] == label
+        weights = np.where(mask, np.maximum(nats[inside], 0), 0)
         total = float(weights.sum())
         rows, columns = weights.sum(axis=1), weights.sum(axis=0)
         middle = np.array([columns @ np.arange(width), rows @ np.arange(height)]) / max(total, 1e-9)
         low, high = np.array([x, y]), np.array([x + width - 1, y + height - 1])
         is_cut = bool(np.any(low == 0) or np.any(high == np.array(camera.size) - 1))
-        found.append(MovingRegion(camera, low + middle, total / PIXEL_EVIDENCE_LIMIT, is_cut))
+        found.append(MovingRegion(camera, low + middle, total / PIXEL_EVIDENCE_LIMIT, is_cut, (int(x), int(y)), mask))
     found.sort(key=lambda region: -region.area_px)
     return found[:_MOST_REGIONS]

@@ -25,7 +25,7 @@ from airborne.tracking.capsules.standing import ColourViews
 from airborne.tracking.capsules.track import evidence_per_px
 from airborne.tracking.first_pose.candidates import LEAST_PROBABILITY
 from airborne.tracking.players import PlayerStart
-from airborne.types import Array
+from airborne.types import Array, Progress
 from airborne.video import Frames, View
 
 _COURT_M = (4.5, 9.0)  # half width and half length (FIVB rules of volleyball, 1.1)
@@ -106,7 +106,13 @@ class PlayersSearch:
         return self.candidates[0].is_plausible and self.candidates[0].probability >= LEAST_PROBABILITY
 
 
-def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, near_net: bool = True) -> PlayersSearch:
+def find_players(
+    sample: Sequence[Frames],
+    whole: Callable[[int], Frames],
+    *,
+    near_net: bool = True,
+    progress: Progress | None = None,
+) -> PlayersSearch:
     """Find the players at the net, or all on the cameras' half of the court, at the best of some times.
 
     `sample` holds small pictures, `whole` returns those of a frame's number in full size. The world is the court's: its
@@ -116,7 +122,9 @@ def find_players(sample: Sequence[Frames], whole: Callable[[int], Frames], *, ne
     moments = [_Moment.of(frames, near_net=near_net) for frames in sample[:: -(-len(sample) // _MOST_MOMENTS) or 1]]
     findings: list[PlayersSearch] = []
     complete, most = findings, 0
-    for moment in _best_first(moments)[:_MOST_SEARCHED]:
+    for number, moment in enumerate(_best_first(moments)[:_MOST_SEARCHED]):
+        if progress is not None:
+            progress(number, _MOST_SEARCHED)
         findings.append(moment.search(whole))
         most = max(finding.n_players for finding in findings)
         complete = [finding for finding in findings if finding.n_players == most]

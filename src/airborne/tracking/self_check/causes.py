@@ -178,7 +178,7 @@ def _size(solution: NuisanceSolution, nuisance: Nuisance, prior: Array) -> tuple
 def _describe(subject: str, kind: Kind, value: float, sd: float) -> str:
     size = abs(value)
     if kind == "scale":
-        what, than = ("body", "its file") if subject == "body" else ("world", "the calibration")
+        what, than = ("body", "its model") if subject == "body" else ("world", "the calibration")
         return f"the {what} looks {100 * size:.1f} ± {100 * sd:.1f} % {_larger(value)} than {than} says"
     if kind == "turn_deg":
         return f"camera {subject} seems turned by {size:.2f} ± {sd:.2f}°"

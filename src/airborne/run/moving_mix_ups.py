@@ -1,0 +1,137 @@
+"""Mix-ups of the videos of one body whose start is not known: what stands out in them is not one body's silhouettes.
+
+Exchanged, mirrored or upside-down images are found as those without which the visual hull covers the silhouettes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from airborne.cameras import Camera
+from airborne.errors import MistakesError
+from airborne.run.mix_ups import MixUp, possible_mix_ups
+from airborne.tracking.first_pose.moments import Moment
+from airborne.tracking.first_pose.places import MovingRegion, moving_regions
+from airborne.tracking.first_pose.visual_hull import uncovered_share
+
+_N_MOMENTS = 6  # chosen: spread over those in which most cameras see something move
+# Chosen on people 8000, 8001 and 8008 to 8013 and throws 8000 to 8008 of `benchmarks/accuracy/mix_ups.py`, of which one
+# body's silhouettes were uncovered by up to 0.23. Shares of them: from which on a mix-up is looked for; below which
+# they are one body's; from which on they are asked about
+_LEAST_MIXED_UP, _MOST_UNCOVERED, _LEAST_ASKED = 0.1, 0.15, 0.3
+# chosen there: how many times less than as they are, and than in any other way, they are without a mix-up, or a camera
+_OF_MIX_UP, _OF_ODD_CAMERA = (3.0, 2.0), (2.0, 1.5)
+
+
+_Regions = Sequence[MovingRegion | None]  # the largest of each camera, None where it is cut by the image or none is
+
+
+class MovingSilhouettes(NamedTuple):
+    """What the silhouettes of what moves say."""
+
+    uncovered: float  # share of them that cannot be one body's; NaN where two cameras see nothing whole
+    odd_camera: str = ""  # without which the others' are one body's, where there is one
+
+    @property
+    def are_one_body(self) -> bool:
+        """Whether they look like those of one body."""
+        return self.uncovered < _MOST_UNCOVERED
+
+    @property
+    def question(self) -> str:
+        """What to ask where they do not look like those of one body; empty where they do, or tell little."""
+        if not self.uncovered >= _LEAST_ASKED:
+            return ""
+        what = f"{self.uncovered:.0%} of the silhouettes of what moves cannot be one body's"
+        if not self.odd_camera:
+            return f"{what}: is each video its camera's and of this recording, and is it one body that moves?"
+        return f"{what}, but those without {self.odd_camera} can: is its video of this recording, and was it moved?"
+
+
+def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
+    """Return what the silhouettes of what moves say.
+
+    Raises MistakesError, naming the cameras, where they are those of one body only without a mix-up.
+    """
+    chosen = _choose(moments)
+    as_they_are = _median_uncovered(chosen)
+    if not as_they_are >= _LEAST_MIXED_UP:
+        return MovingSilhouettes(as_they_are)
+    cameras = chosen[0][0]
+    names = [camera.name for camera in cameras]
+    mix_ups = [each for each in possible_mix_ups(len(names)) if len({cameras[i].size for i in each.cameras}) == 1]
+    without = [_median_uncovered([_undo(mix_up, *each) for each in chosen]) for mix_up in mix_ups]
+    if (best := _clear_minimum(without, as_they_are, *_OF_MIX_UP)) is not None:
+        what = (
+            f"{as_they_are:.0%} of the silhouettes of what moves cannot be one body's, and {without[best]:.0%} with "
+            f"{mix_ups[best].describe(names)}"
+        )
+        sentence = mix_ups[best].finding(names, what).sentence
+        raise MistakesError("the videos", [f"{sentence}; if that is not so, calibrate anew, or give [start]"])
+    left_out = [_median_uncovered([_leave_out(i, *each) for each in chosen]) for i in range(len(names))]
+    odd = _clear_minimum(left_out, as_they_are, *_OF_ODD_CAMERA)
+    return MovingSilhouettes(as_they_are, "" if odd is None else names[odd])
+
+
+def _clear_minimum(shares: Sequence[float], as_they_are: float, times: float, times_another: float) -> int | None:
+    """Return which share is that of one body's silhouettes, so many times less than as they are and than any other."""
+    best, another = np.argsort(shares)[:2]
+    is_clear = shares[best] * times < as_they_are and shares[best] * times_another < shares[another]
+    return int(best) if is_clear and shares[best] < _MOST_UNCOVERED else None
+
+
+def _median_uncovered(chosen: Sequence[tuple[Sequence[Camera], _Regions]]) -> float:
+    """Return what the visual hull leaves of the silhouettes of some moments; NaN with fewer than two at each."""
+    found = [[each for each in regions if each is not None] for _, regions in chosen]
+    shares = [uncovered_share(each) for each in found if len(each) > 1]
+    return float(np.median(shares)) if shares else np.nan
+
+
+def _leave_out(i: int, cameras: Sequence[Camera], regions: _Regions) -> tuple[Sequence[Camera], _Regions]:
+    return cameras, [None if k == i else region for k, region in enumerate(regions)]
+
+
+def _choose(moments: Sequence[Moment]) -> list[tuple[list[Camera], _Regions]]:
+    """Return cameras and regions of some of the moments in which most of them see something move, two at least."""
+    found = []
+    for moment in moments:
+        views = [view for view in moment.frames.views if view is not None]
+        if len(views) < len(moment.frames.views):
+            continue
+        of_view = [
+            [] if nats is None else moving_regions(view.camera, nats)
+            for view, nats in zip(views, moment.evidence, strict=True)
+        ]
+        largest = [regions[0] if regions and not regions[0].is_cut else None for regions in of_view]
+        found.append(([view.camera for view in views], largest))
+    most = max((_count(regions) for _, regions in found), default=0)
+    best = [each for each in found if _count(each[1]) == most > 1]
+    return [best[i] for i in np.unique(np.linspace(0, len(best) - 1, _N_MOMENTS).round().astype(int))] if best else []
+
+
+def _count(regions: _Regions) -> int:
+    return sum(region is not None for region in regions)
+
+
+def _undo(mix_up: MixUp, cameras: Sequence[Camera], regions: _Regions) -> tuple[Sequence[Camera], _Regions]:
+    """Return the regions as they would be without a mix-up."""
+    i, j = mix_up.cameras[0], mix_up.cameras[-1]
+    right = list(regions)
+    if mix_up.is_exchange:
+        right[i], right[j] = (
+            None if (region := regions[source]) is None else replace(region, camera=cameras[target])
+            for target, source in ((i, j), (j, i))
+        )
+    elif (region := regions[i]) is not None:
+        flipped = np.array(cameras[i].size) - region.mask.shape[::-1] - region.corner
+        centre = np.array(cameras[i].size) - 1 - region.centre
+        if mix_up.is_turned:
+            right[i] = replace(region, corner=tuple(flipped.tolist()), centre=centre, mask=region.mask[::-1, ::-1])
+        else:
+            corner, centre = (int(flipped[0]), region.corner[1]), np.array([centre[0], region.centre[1]])
+            right[i] = replace(region, corner=corner, centre=centre, mask=region.mask[:, ::-1])
+    return cameras, right
