@@ -82,14 +82,14 @@ def with_video_of(moments: Sequence[Moment], other: Sequence[Moment], number: in
 
 
 def verdict(moments: Sequence[Moment], names: Sequence[str], mix_up: MixUp | None = None, odd: str = "") -> str:
-    """Return right, wrong, asked or silent: what is named, what is asked about without a name, and else."""
+    """Return right, wrong or silent, by what is named."""
     try:
         found = refuse_moving_mix_ups(moments)
     except MistakesError as error:
         return "right" if mix_up is not None and mix_up.describe(names) in str(error) else "wrong"
-    if found.odd_camera and found.question:
-        return "right" if found.odd_camera == odd else "wrong"
-    return "asked" if found.question else "silent"
+    if not found.odd_camera:
+        return "silent"
+    return "right" if found.odd_camera == odd else "wrong"
 
 
 def verdicts(scenes: Iterator[Scene]) -> Iterator[tuple[str, str]]:
@@ -128,7 +128,7 @@ def main() -> None:
             base = {"data": f"{data} {options.seeds}, {with_what}", "method": "silhouettes", "unit": "%", "n": n}
             rows += [
                 {**base, "metric": word, "value": 100 * counts[with_what, word] / n}
-                for word in ("right", "wrong", "asked", "silent")
+                for word in ("right", "wrong", "silent")
             ]
     if options.quick or options.seeds != SEED:
         for row in rows:

@@ -17,7 +17,7 @@ from airborne.run.moving_mix_ups import refuse_moving_mix_ups
 from airborne.tracking.first_pose.moments import Moment
 from airborne.video import Frames, View
 
-SIZE, N = (320, 240), 4  # [px], moments
+SIZE, N = (320, 240), 3  # [px], moments
 PLACES = {"left": (-4.0, -3.0, 1.2), "middle": (0.5, -5.0, 2.5), "right": (4.0, -2.0, 0.8)}
 RIG = Rig(tuple(camera_looking_at(n, p, (0, 0, 1.2), focal_px=300.0, size=SIZE) for n, p in PLACES.items()))
 BODY = human18(1.75, 70.0)
@@ -88,14 +88,15 @@ def test_a_video_of_another_recording_is_asked_about(odd):
     assert f"without {RIG.names[odd]}" in found.question
 
 
-def test_two_bodies_of_which_each_camera_shows_another_are_asked_about():
+def test_pieces_of_which_each_camera_shows_another_are_not_asked_about():
+    """So are the regions of somebody who hardly moves: the empty scene holds the rest of him."""
+
     def change(number, evidence):
         return [np.roll(each, 45 * (i - 1), axis=i % 2) for i, each in enumerate(evidence)]
 
     found = refuse_moving_mix_ups(moments(change))
     assert not found.are_one_body
-    assert found.odd_camera == ""
-    assert "one body" in found.question
+    assert found.question == ""
 
 
 @pytest.mark.parametrize("known", [0, 1])

@@ -21,7 +21,7 @@ from airborne.tracking.first_pose.visual_hull import uncovered_share
 _N_MOMENTS = 6  # chosen: spread over those in which most cameras see something move
 # Chosen on people 8000, 8001 and 8008 to 8013 and throws 8000 to 8008 of `benchmarks/accuracy/mix_ups.py`, of which one
 # body's silhouettes were uncovered by up to 0.23. Shares of them: from which on a mix-up is looked for; below which
-# they are one body's; from which on they are asked about
+# they are one body's; from which on an odd camera is asked about
 _LEAST_MIXED_UP, _MOST_UNCOVERED, _LEAST_ASKED = 0.1, 0.15, 0.3
 # chosen there: how many times less than as they are, and than in any other way, they are without a mix-up, or a camera
 _OF_MIX_UP, _OF_ODD_CAMERA = (3.0, 2.0), (2.0, 1.5)
@@ -43,13 +43,13 @@ class MovingSilhouettes(NamedTuple):
 
     @property
     def question(self) -> str:
-        """What to ask where they do not look like those of one body; empty where they do, or tell little."""
-        if not self.uncovered >= _LEAST_ASKED:
-            return ""
-        what = f"{self.uncovered:.0%} of the silhouettes of what moves cannot be one body's"
+        """What to ask about the odd camera; empty where there is none."""
         if not self.odd_camera:
-            return f"{what}: is each video its camera's and of this recording, and is it one body that moves?"
-        return f"{what}, but those without {self.odd_camera} can: is its video of this recording, and was it moved?"
+            return ""
+        return (
+            f"{self.uncovered:.0%} of the silhouettes of what moves cannot be one body's, but those without "
+            f"{self.odd_camera} can: is its video of this recording, and was it moved or calibrated wrongly?"
+        )
 
 
 def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
@@ -72,6 +72,8 @@ def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
         )
         sentence = mix_ups[best].finding(names, what).sentence
         raise MistakesError("the videos", [f"{sentence}; if that is not so, calibrate anew, or give [start]"])
+    if as_they_are < _LEAST_ASKED:
+        return MovingSilhouettes(as_they_are)
     left_out = [_median_uncovered([_leave_out(i, *each) for each in chosen]) for i in range(len(names))]
     odd = _clear_minimum(left_out, as_they_are, *_OF_ODD_CAMERA)
     return MovingSilhouettes(as_they_are, "" if odd is None else names[odd])
