@@ -82,14 +82,15 @@ def with_video_of(moments: Sequence[Moment], other: Sequence[Moment], number: in
 
 
 def verdict(moments: Sequence[Moment], names: Sequence[str], mix_up: MixUp | None = None, odd: str = "") -> str:
-    """Return right, wrong or silent, by what is named."""
+    """Return refused or asked, where what is wrong is named so, else wrong or silent."""
+    right = mix_up.describe(names) if mix_up is not None else f"without {odd} "
     try:
-        found = refuse_moving_mix_ups(moments)
+        doubts = refuse_moving_mix_ups(moments).doubts
     except MistakesError as error:
-        return "right" if mix_up is not None and mix_up.describe(names) in str(error) else "wrong"
-    if not found.odd_camera:
+        return "refused" if mix_up is not None and right in str(error) else "wrong"
+    if not doubts:
         return "silent"
-    return "right" if found.odd_camera == odd else "wrong"
+    return "asked" if right in " ".join(doubts) and (odd or mix_up is not None) else "wrong"
 
 
 def verdicts(scenes: Iterator[Scene]) -> Iterator[tuple[str, str]]:
@@ -128,7 +129,7 @@ def main() -> None:
             base = {"data": f"{data} {options.seeds}, {with_what}", "method": "silhouettes", "unit": "%", "n": n}
             rows += [
                 {**base, "metric": word, "value": 100 * counts[with_what, word] / n}
-                for word in ("right", "wrong", "silent")
+                for word in ("refused", "asked", "wrong", "silent")
             ]
     if options.quick or options.seeds != SEED:
         for row in rows:

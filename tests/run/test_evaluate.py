@@ -161,6 +161,14 @@ def test_agreement_of_joints_is_reported_in_tables_figures_and_a_paragraph(run, 
     assert contents_of(run) == before
 
 
+def test_a_folder_that_holds_another_run_is_left_alone(run, tmp_path):
+    other = shutil.copytree(run, tmp_path / "other")
+    before = contents_of(other)
+    with pytest.raises(ResultError, match="other holds another run"):
+        evaluate_agreement(run, joints=run.parent / "higher.csv", out=other)
+    assert contents_of(other) == before
+
+
 def test_a_second_reference_leaves_the_results_of_the_first(run, tmp_path):
     truth = shutil.copyfile(run / "motion.csv", tmp_path / "truth.csv")
     for references in ({"joints": run.parent / "higher.csv"}, {"truth": truth}, {"truth": truth}):

@@ -16,6 +16,7 @@ from airborne.geometry.rotations import geodesic
 from airborne.run import find
 from airborne.run.check import check_trial
 from airborne.run.frame import write_frame
+from airborne.run.moving_mix_ups import MovingSilhouettes
 from airborne.run.track import track_trial
 from airborne.trial.file import read_trial
 from tests.support.example_trial import light_cross
@@ -197,3 +198,22 @@ def test_undecided_is_an_error_of_the_trial():
 )
 def test_no_start_is_said_to_be_certain(probability, says):
     assert find.describe_probability(probability) == says
+
+
+@pytest.mark.usefixtures("searched")
+def test_what_makes_the_videos_doubtful_is_said_with_the_start_and_where_none_is_decided(path, tmp_path, monkeypatch):
+    doubtful = MovingSilhouettes(0.5, ("those without cam2 can: was it moved?",))
+    monkeypatch.setattr(find, "refuse_moving_mix_ups", lambda moments: doubtful)
+    found = find.find_start(read_trial(path), tmp_path)
+    assert found.notes[0].startswith("[start] was found")
+    assert found.notes[1:] == doubtful.doubts
+    decide = find.find_thing
+    monkeypatch.setattr(
+        find,
+        "find_thing",
+        lambda *given: replace(
+            decide(*given), candidates=tuple(replace(each, is_plausible=False) for each in decide(*given).candidates)
+        ),
+    )
+    with pytest.raises(UndecidedError, match=r"those without cam2 can: was it moved\?; look at"):
+        find.find_start(read_trial(path), tmp_path)

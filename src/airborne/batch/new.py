@@ -70,13 +70,17 @@ def write_study(
     folder.mkdir(parents=True, exist_ok=True)
     from_session = Path(os.path.relpath(videos.absolute(), folder.absolute())).as_posix()
     session = folder / SESSION
+    files: list[Path] = []
+    notes: list[str] = []
+    unread: list[str] = []
     tables = [
-        {"name": name, "video": f"{from_session}/{pattern}".replace(f"{{{_CAMERA}}}", name)} | _fields(found, name)
+        {"name": name, "video": f"{from_session}/{pattern}".replace(f"{{{_CAMERA}}}", name)}
+        | _fields(found, name, unread)
         for name in cameras
     ]
-    files, notes = [], []
     if not session.exists():
         interlaced = [table for table in tables if "fields" in table]
+        notes += unread
         notes += [
             f"{t['name']}: {SESSION} gives its fields as {t['fields']}, as the file's flags say" for t in interlaced
         ]
@@ -117,12 +121,16 @@ def _match(videos: Path, pattern: str) -> dict[tuple[str, ...], dict[str, Path]]
     return found
 
 
-def _fields(found: Mapping[tuple[str, ...], Mapping[str, Path]], camera: str) -> dict[str, str]:
-    """Return the order of a camera's fields that its first video is flagged with; none of a progressive one."""
+def _fields(found: Mapping[tuple[str, ...], Mapping[str, Path]], camera: str, notes: list[str]) -> dict[str, str]:
+    """Return the order of a camera's fields that its first video is flagged with; none of a progressive one.
+
+    Of a video that cannot be read, what is wrong with it is noted.
+    """
     path = next(by_camera[camera] for by_camera in found.values() if camera in by_camera)
     try:
         order = inspect(VideoSource(camera, path)).flagged_order
-    except VideoError:  # what is wrong with a video is said where it is tracked
+    except VideoError as error:
+        notes.append(f"{error}; if its pictures hold two fields, add `fields` to its [[camera]] in {SESSION}")
         return {}
     return {} if order == "progressive" else {"fields": order}
 

@@ -16,8 +16,8 @@ def film_command(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The film, .mp4 or .gif; the run's videos/film.mp4.")
     ] = None,
-    first: Annotated[int | None, typer.Option(help="First frame; the run's.")] = None,
-    last: Annotated[int | None, typer.Option(help="Last frame; the run's.")] = None,
+    first: Annotated[int | None, typer.Option(min=0, help="First frame; the run's.")] = None,
+    last: Annotated[int | None, typer.Option(min=0, help="Last frame; the run's.")] = None,
 ) -> None:
     """Write a stretch of a run as a film: all cameras with outlines side by side, over curves with a cursor.
 

@@ -35,10 +35,11 @@ def find_command(
     with open_results(output), progress(f"looking for the {'players' if checked.has_players else 'body'}") as report:
         found = find(checked, output, take=take, progress=report)
     if as_json:
-        print(json.dumps({**found.start, "probability": found.finding.candidates[0].probability, "note": found.note}))
+        print(json.dumps({**found.start, "probability": found.finding.candidates[0].probability, "notes": found.notes}))
     else:
         print(tomlkit.dumps({"start": found.start}), end="")
-        print(f"# {found.note}")
+        for note in found.notes:
+            print(f"# {note}")
 
 
 def frame_command(

@@ -99,7 +99,7 @@ class KernelCache(_Cache):
 @functools.cache
 def _say_that_it_compiles() -> None:
     """Log it, once a process."""
-    _LOG.info("compiling what this command needs for this processor: a minute or more, kept for later runs")
+    _LOG.info("compiling what this command needs for this processor: up to a minute or two, once")
 
 
 def _stem(kernel: Dispatcher) -> str:

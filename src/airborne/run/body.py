@@ -79,7 +79,7 @@ class BodyRun:
         model = trial.model()
         first = find_first_pose(trial, model, opened.recording.rig, opened.detections)
         keys, missed = keys_of_frames(trial, model, opened.recording)
-        notes = [*model.notes, *([] if found is None else [found.note])]
+        notes = [*model.notes, *([] if found is None else found.notes)]
         notes += [note for note in first.notes if note not in first.doubts]
         opened.recording.events.extend([*notes, *missed])
         return cls(trial, opened.recording, opened.calibration, model, first.pose, found, keys, first)

@@ -192,10 +192,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda _: f"start: not given; the {who} looked for when the trial is tracked",
         )
         if not trial.has_players and len(recording.rig) > 1:
-            seen = checks.attempt(
-                lambda: _look_for_mix_ups(trial, recording), lambda seen: _ONE_BODY if seen.are_one_body else _UNDECIDED
-            )
-            checks.doubts += [seen.question] if seen is not None and seen.question else []
+            _note_mix_ups(checks, trial, recording)
     elif trial.has_players:
         tracker = checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
@@ -232,10 +229,21 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         checks.add(f"note: {event}")
 
 
-def _look_for_mix_ups(trial: Trial, recording: Recording) -> MovingSilhouettes:
-    """Return what the silhouettes of what moves say; raises MistakesError where they speak of a mix-up."""
-    _, sample = look_at(trial, recording, _MOST_IMAGES)
-    return refuse_moving_mix_ups(look(sample, empty_scenes(sample)))
+def _note_mix_ups(checks: Checks, trial: Trial, recording: Recording) -> None:
+    """Look whether what moves in the videos is one body, and whether videos are mixed up."""
+
+    def look_for_mix_ups() -> MovingSilhouettes:
+        _, sample = look_at(trial, recording, _MOST_IMAGES)
+        return refuse_moving_mix_ups(look(sample, empty_scenes(sample)))
+
+    try:
+        seen = look_for_mix_ups()
+    except AirborneError as error:
+        checks.mistakes += error.mistakes if isinstance(error, MistakesError) else [str(error)]
+        return
+    checks.doubts += seen.doubts
+    if not seen.doubts:
+        checks.add(_ONE_BODY if seen.are_one_body else _UNDECIDED)
 
 
 def _exists(trial: Trial, name: str | None) -> bool:

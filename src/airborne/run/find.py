@@ -50,7 +50,7 @@ class FoundStart:
     finding: StartSearch
     scenes: Mapping[SourceKey, EmptyScene]
     facts: tuple[VideoFacts, ...]
-    note: str  # what the user should know, in one line
+    notes: tuple[str, ...]  # what the user should know, one line each
 
     @property
     def start(self) -> dict[str, Any]:
@@ -92,9 +92,9 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     if take is not None:
         finding = take_candidate(trial, finding, take)
     elif not finding.is_decided:
-        raise _ask_for_help(trial, model, finding, folder, silhouettes.question)
+        raise _ask_for_help(trial, model, finding, folder, silhouettes.doubts)
     first = finding.candidates[0]
-    frame, pose = _track_back(trial, model, recording, finding)
+    frame, pose = _track_back(trial, model, recording, finding, progress)
     pose = least_turned_pose(model, pose)
     chosen = "was found" if take is None else f"is candidate {take}, as --take says"
     note = (
@@ -103,7 +103,9 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     )
     if len(symmetries(model)) > 1:
         note += "; turned poses of this body look alike, and of them this is turned least from the world's axes"
-    return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, note)
+    return FoundStart(
+        _with_start(trial, model, frame, pose), model, finding, scenes, facts, (note, *silhouettes.doubts)
+    )
 
 
 def describe_probability(probability: float) -> str:
@@ -171,8 +173,10 @@ def open_candidates(folder: Path) -> None:
     refuse_links(folder)
 
 
-def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: Path, question: str) -> UndecidedError:
-    """Write the candidates and return the error that names them; it asks what their silhouettes make one ask."""
+def _ask_for_help(
+    trial: Trial, model: BodyModel, finding: StartSearch, folder: Path, doubts: Sequence[str]
+) -> UndecidedError:
+    """Write the candidates and return the error that names them; it says what makes the videos doubtful."""
     from airborne.export.finding import draw_candidates
 
     frame, best = finding.moment.frames.index, finding.candidates[0]
@@ -189,11 +193,11 @@ def _ask_for_help(trial: Trial, model: BodyModel, finding: StartSearch, folder: 
             f"no pose agrees with what moves in frame {frame} (of the likeliest, {best.precision:.0%} of the outline "
             f"stands out, and covers {best.recall:.0%} of what does)"
         )
-        question = question or "check that each camera has its own video, and [calibration] and [body]"
+        doubts = doubts or ["check that each camera has its own video, and [calibration] and [body]"]
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
     return UndecidedError(
-        f"{trial.name}: the start is undecided: {'; '.join(filter(None, [reason, question]))}; look at "
+        f"{trial.name}: the start is undecided: {'; '.join([reason, *doubts])}; look at "
         f"{folder / CANDIDATES_PICTURE}{sides} (where the outlines miss the body in one camera, its video may be "
         "another's), then give --take 1 (or another number), or the pose under [start]"
     )
@@ -230,7 +234,9 @@ def _describe(model: BodyModel, finding: StartSearch) -> dict[str, Any]:
     }
 
 
-def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: StartSearch) -> tuple[int, Pose]:
+def _track_back(
+    trial: Trial, model: BodyModel, recording: Recording, finding: StartSearch, progress: Progress | None
+) -> tuple[int, Pose]:
     """Track from the moment of the finding back in time; return the earliest frame that is tracked, and the pose."""
     found, pose = finding.moment.frames.index, finding.candidates[0].pose
     kept = frames_up_to(trial, recording, found)
@@ -239,7 +245,9 @@ def _track_back(trial: Trial, model: BodyModel, recording: Recording, finding: S
     backward = [turn_time(frames) for frames in reversed(kept)]
     tracker = RefinedTracker(sample_body_colours(model, pose, backward[0]), pose)
     earliest = found, pose
-    for _, estimate in track_frames(tracker, backward, lambda estimate: None):
+    for number, (_, estimate) in enumerate(track_frames(tracker, backward, lambda estimate: None), start=1):
+        if progress is not None:
+            progress(number, len(backward))
         if estimate.status is Status.TRACKED and estimate.pose is not None:
             earliest = -estimate.index, estimate.pose
         elif -estimate.index < found:  # a first frame may be uncertain: nothing was learned before it

@@ -38,7 +38,7 @@ class FoundPlayers:
     trial: Trial  # with the start that was found
     finding: PlayersSearch
     facts: tuple[VideoFacts, ...]
-    note: str  # what the user should know, in one line
+    notes: tuple[str, ...]  # what the user should know, one line each
 
     @property
     def start(self) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def find_players_start(
         f"[[start.player]]: {count(len(starts), 'player')} found, who {stand} out best in frame {finding.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
-    return FoundPlayers(_with_start(trial, frame, starts), finding, facts, note)
+    return FoundPlayers(_with_start(trial, frame, starts), finding, facts, (note,))
 
 
 def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> UndecidedError:

@@ -23,9 +23,15 @@ _N_MOMENTS = 6  # chosen: spread over those in which most cameras see something 
 # body's silhouettes were uncovered by up to 0.23. Shares of them: from which on a mix-up is looked for; below which
 # they are one body's; from which on an odd camera is asked about
 _LEAST_MIXED_UP, _MOST_UNCOVERED, _LEAST_ASKED = 0.1, 0.15, 0.3
-# chosen there: how many times less than as they are, and than in any other way, they are without a mix-up, or a camera
-_OF_MIX_UP, _OF_ODD_CAMERA = (3.0, 2.0), (2.0, 1.5)
+# chosen there: how many times less than as they are, and than in any other way, they are without a mix-up that is
+# refused, and without one, or a camera, that is asked about
+_OF_MIX_UP, _OF_DOUBT = (3.0, 2.0), (2.0, 1.5)
 
+
+_STILL = (
+    "nothing is seen to move in the video of {camera}: does it show the body, and is it of this recording? Correct "
+    "that, or leave it out (--cameras)"
+)
 
 _Regions = Sequence[MovingRegion | None]  # the largest of each camera, None where it is cut by the image or none is
 
@@ -34,22 +40,12 @@ class MovingSilhouettes(NamedTuple):
     """What the silhouettes of what moves say."""
 
     uncovered: float  # share of them that cannot be one body's; NaN where two cameras see nothing whole
-    odd_camera: str = ""  # without which the others' are one body's, where there is one
+    doubts: tuple[str, ...] = ()  # what seems wrong with the videos, one line each
 
     @property
     def are_one_body(self) -> bool:
-        """Whether they look like those of one body."""
+        """Whether they look like those of one body, in the cameras that show it."""
         return self.uncovered < _MOST_UNCOVERED
-
-    @property
-    def question(self) -> str:
-        """What to ask about the odd camera; empty where there is none."""
-        if not self.odd_camera:
-            return ""
-        return (
-            f"{self.uncovered:.0%} of the silhouettes of what moves cannot be one body's, but those without "
-            f"{self.odd_camera} can: is its video of this recording, and was it moved or calibrated wrongly?"
-        )
 
 
 def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
@@ -57,26 +53,39 @@ def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
 
     Raises MistakesError, naming the cameras, where they are those of one body only without a mix-up.
     """
-    chosen = _choose(moments)
+    chosen, doubts = _choose(moments), [_STILL.format(camera=name) for name in _still_cameras(moments)]
     as_they_are = _median_uncovered(chosen)
     if not as_they_are >= _LEAST_MIXED_UP:
-        return MovingSilhouettes(as_they_are)
+        return MovingSilhouettes(as_they_are, tuple(doubts))
     cameras = chosen[0][0]
     names = [camera.name for camera in cameras]
     mix_ups = [each for each in possible_mix_ups(len(names)) if len({cameras[i].size for i in each.cameras}) == 1]
     without = [_median_uncovered([_undo(mix_up, *each) for each in chosen]) for mix_up in mix_ups]
-    if (best := _clear_minimum(without, as_they_are, *_OF_MIX_UP)) is not None:
-        what = (
-            f"{as_they_are:.0%} of the silhouettes of what moves cannot be one body's, and {without[best]:.0%} with "
-            f"{mix_ups[best].describe(names)}"
-        )
-        sentence = mix_ups[best].finding(names, what).sentence
-        raise MistakesError("the videos", [f"{sentence}; if that is not so, calibrate anew, or give [start]"])
-    if as_they_are < _LEAST_ASKED:
-        return MovingSilhouettes(as_they_are)
     left_out = [_median_uncovered([_leave_out(i, *each) for each in chosen]) for i in range(len(names))]
-    odd = _clear_minimum(left_out, as_they_are, *_OF_ODD_CAMERA)
-    return MovingSilhouettes(as_they_are, "" if odd is None else names[odd])
+    what = f"{as_they_are:.0%} of the silhouettes of what moves cannot be one body's"
+    if (best := _clear_minimum(without, as_they_are, *_OF_DOUBT)) is not None:
+        shows = f"{what}, and {without[best]:.0%} with {mix_ups[best].describe(names)}"
+        if best == _clear_minimum(without, as_they_are, *_OF_MIX_UP):
+            sentence = mix_ups[best].finding(names, shows).sentence
+            raise MistakesError("the videos", [f"{sentence}; if that is not so, calibrate anew, or give [start]"])
+        doubts.append(f"{shows}: are these videos right?")
+    elif as_they_are >= _LEAST_ASKED and (odd := _clear_minimum(left_out, as_they_are, *_OF_DOUBT)) is not None:
+        doubts.append(
+            f"{what}, but those without {names[odd]} can: is its video of this recording, and was it moved or "
+            "calibrated wrongly? Correct that, or leave it out (--cameras)"
+        )
+    return MovingSilhouettes(as_they_are, tuple(doubts))
+
+
+def _still_cameras(moments: Sequence[Moment]) -> list[str]:
+    """Return the cameras in which nothing stands out at any moment, where something does in others."""
+    moves: dict[str, bool] = {}
+    for moment in moments:
+        for view, nats in zip(moment.frames.views, moment.evidence, strict=True):
+            if view is not None and nats is not None:
+                name = view.camera.name
+                moves[name] = moves.get(name, False) or bool(moving_regions(view.camera, nats))
+    return [name for name, does in moves.items() if not does] if any(moves.values()) else []
 
 
 def _clear_minimum(shares: Sequence[float], as_they_are: float, times: float, times_another: float) -> int | None:

@@ -162,7 +162,7 @@ def _open_players(trial: Trial, options: _Options, stack: ExitStack) -> PlayersR
     trial = options.shorten(trial)
     facts = None if found is None else found.facts
     opened = _open_live(trial, stack, options.progress) if options.live else open_trial(trial, facts)
-    opened.recording.events.extend([] if found is None else [found.note])
+    opened.recording.events.extend([] if found is None else found.notes)
     players = PlayersRun.open(trial, opened)
     if isinstance(opened.recording, Recording):
         refuse_players_mix_ups(players.starts, opened.recording)

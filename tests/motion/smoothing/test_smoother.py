@@ -168,8 +168,8 @@ def test_hardly_any_frame_gives_no_numbers_and_no_error(n):
     [
         ({"method": "spline", "fill_s": 0.6}, "0 to 0.5 s"),
         ({"method": "spline", "fill_s": float("nan")}, "0 to 0.5 s"),
-        ({"method": "kalman", "cutoff_hz": 6}, "leave them out of kalman"),
         ({"method": "spline", "resample_hz": 60}, "leave them out of spline"),
+        ({"method": "kalman", "cutoff_hz": 6}, "leave them out of kalman"),
     ],
 )
 def test_what_makes_no_sense_is_refused(wrong, message):

@@ -70,7 +70,7 @@ class Smoothing:
                 "the motion in between is unknown"
             )
         if self.method != "butterworth" and not (self.cutoff_hz is self.resample_hz is None):
-            raise ResultError(f"cut-off and resampling belong to a Butterworth filter; leave them out of {self.method}")
+            raise ResultError(f"cut-off and resampling are a Butterworth filter's; leave them out of {self.method}")
 
     def smoother(self) -> Smoother:
         """Return the smoother of one stretch. Raises ResultError for a Butterworth filter without a cut-off."""
