@@ -141,6 +141,14 @@ def test_the_band_is_two_standard_deviations_wide_and_absent_where_they_are_infi
     assert 2.0 not in corners[:, 0]
 
 
+def test_a_frame_alone_has_a_band_that_can_be_seen():
+    axes = Figure().subplots()
+    panels.draw_band(axes, np.arange(4.0), np.full(4, 3.0), np.array([np.inf, 0.5, np.inf, np.inf]))
+    _, band = axes.collections
+    box = band.get_paths()[0].get_extents()
+    assert box.extents.tolist() == [0.75, 2.0, 1.25, 4.0]
+
+
 @pytest.fixture
 def plotted(monkeypatch):
     """Everything plotted as an estimate: panel label -> values; labels are set after plotting."""

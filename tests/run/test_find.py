@@ -215,5 +215,5 @@ def test_what_makes_the_videos_doubtful_is_said_with_the_start_and_where_none_is
             decide(*given), candidates=tuple(replace(each, is_plausible=False) for each in decide(*given).candidates)
         ),
     )
-    with pytest.raises(UndecidedError, match=r"those without cam2 can: was it moved\?; look at"):
+    with pytest.raises(UndecidedError, match=r"those without cam2 can: was it moved\? look at"):
         find.find_start(read_trial(path), tmp_path)

@@ -23,6 +23,7 @@ from airborne.video import Frames, View
 
 _TITLES = ("empty scene", "what stands out", "where the body was found")
 _ASPECT = 0.8  # height over width of a cell: whole images are wider than high
+_MOST_ASPECT = 1.6  # chosen: of a cell that shows an upright body
 _TINT = 0.5  # share of a side's colour in that of its limbs
 _MARGIN = 0.6  # around a candidate, as a share of its size
 
@@ -49,8 +50,7 @@ def draw_candidates(path: Path, moment: Moment, candidates: Sequence[tuple[str, 
     """
     views = [view for view in moment.frames.views if view is not None]
     rows = [[_near(_with_sides(view, posed), view.camera, posed) for view in views] for _, posed in candidates]
-    names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
+    _write_candidates(path, rows, [label for label, _ in candidates], views)
 
 
 def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tuple[str, Sequence[Array]]]) -> None:
@@ -59,8 +59,17 @@ def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tupl
     images = [[_with_players(view, states) for view in views] for _, states in candidates]
     boxes = [_box_of(view.camera, [state for _, states in candidates for state in states]) for view in views]
     rows = [[image[box] for image, box in zip(row, boxes, strict=True)] for row in images]
-    names = [f"{number}: {label}" for number, (label, _) in enumerate(candidates, start=1)]
-    write_mosaic(path, rows, names, [ColumnTitle(view.camera.name) for view in views], aspect=_ASPECT)
+    _write_candidates(path, rows, [label for label, _ in candidates], views)
+
+
+def _write_candidates(
+    path: Path, rows: Sequence[Sequence[Image]], labels: Sequence[str], views: Sequence[View]
+) -> None:
+    """Write rows of images around candidates, a column a view, in cells as high as the images ask for."""
+    highest = max(image.shape[0] / image.shape[1] for row in rows for image in row)
+    names = [f"{number}: {label}" for number, label in enumerate(labels, start=1)]
+    titles = [ColumnTitle(view.camera.name) for view in views]
+    write_mosaic(path, rows, names, titles, aspect=min(max(highest, _ASPECT), _MOST_ASPECT))
 
 
 def _with_players(view: View, states: Sequence[Array]) -> Image:

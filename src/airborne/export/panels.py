@@ -119,9 +119,21 @@ def draw_legend(figure: Figure, handles: Sequence[Artist]) -> Figure:
 
 
 def draw_band(axes: Axes, time_s: Array, middle: Array, sd: Array) -> None:
-    """Draw a band of two standard deviations (n,) about `middle` (n,); none where they are infinite or unknown."""
+    """Draw a band of two standard deviations (n,) about `middle` (n,); none where they are infinite or unknown.
+
+    That of a frame alone among others without one is half a frame wide, so that it does not read as exact.
+    """
     spread = 2 * np.where(np.isfinite(sd), sd, np.nan)
     axes.fill_between(time_s, middle - spread, middle + spread, **_BAND_STYLE)
+    is_known = np.pad(np.isfinite(middle + spread), 1)
+    for k in np.flatnonzero(is_known[1:-1] & ~is_known[:-2] & ~is_known[2:]):
+        ((begin_s, end_s),) = intervals(time_s, np.arange(len(time_s)) == k)
+        axes.fill_between(
+            [begin_s + (end_s - begin_s) / 4, end_s - (end_s - begin_s) / 4],
+            middle[k] - spread[k],
+            middle[k] + spread[k],
+            **_BAND_STYLE,
+        )
 
 
 def band_handle(label: str) -> Patch:

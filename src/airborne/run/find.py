@@ -196,11 +196,12 @@ def _ask_for_help(
         doubts = doubts or ["check that each camera has its own video, and [calibration] and [body]"]
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
-    return UndecidedError(
-        f"{trial.name}: the start is undecided: {'; '.join([reason, *doubts])}; look at "
-        f"{folder / CANDIDATES_PICTURE}{sides} (where the outlines miss the body in one camera, its video may be "
-        "another's), then give --take 1 (or another number), or the pose under [start]"
+    advice = (
+        f"look at {folder / CANDIDATES_PICTURE}{sides} (where the outlines miss the body in one camera, its video may "
+        "be another's), then give --take 1 (or another number), or the pose under [start]"
     )
+    said = "; ".join([reason, *doubts, advice]).replace("?; ", "? ")
+    return UndecidedError(f"{trial.name}: the start is undecided: {said}")
 
 
 def _describe_candidate(candidate: Candidate) -> str:
