@@ -58,7 +58,8 @@ class FindControls:
             found = json.loads(command.output())
             self.candidates = ()
             what = f"{count(len(found['player']), 'player')} found" if "player" in found else "Found"
-            says = f"{what} in frame {found['frame']}, {describe_probability(found['probability'])}."
+            probability = describe_probability(found["probability"])
+            says = " ".join([f"{what} in frame {found['frame']}, {probability}.", *found.pop("notes")[1:]])
         else:
             document = read_json(self.session.file(FOUND_LIST))
             self.candidates = tuple({**each, "frame": document["frame"]} for each in document["candidates"])
