@@ -63,10 +63,10 @@ def draw_player_candidates(path: Path, frames: Frames, candidates: Sequence[tupl
 
 
 def _write_candidates(
-    path: Path, rows: Sequence[Sequence[Image]], labels: Sequence[str], views: Sequence[View]
+    path: Path, rows: Sequence[Sequence[Image | None]], labels: Sequence[str], views: Sequence[View]
 ) -> None:
     """Write rows of images around candidates, a column a view, in cells as high as the images ask for."""
-    highest = max(image.shape[0] / image.shape[1] for row in rows for image in row)
+    highest = max((image.shape[0] / image.shape[1] for row in rows for image in row if image is not None), default=0)
     names = [f"{number}: {label}" for number, label in enumerate(labels, start=1)]
     titles = [ColumnTitle(view.camera.name) for view in views]
     write_mosaic(path, rows, names, titles, aspect=min(max(highest, _ASPECT), _MOST_ASPECT))
