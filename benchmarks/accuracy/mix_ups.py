@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -25,7 +24,6 @@ from find_person import person
 from find_start import throw
 from rows import append
 
-from airborne.cameras import Camera
 from airborne.errors import MistakesError
 from airborne.run.mix_ups import MixUp, possible_mix_ups
 from airborne.run.moving_mix_ups import refuse_moving_mix_ups
@@ -33,8 +31,8 @@ from airborne.synthetic.throw.pictures import scene_frames
 from airborne.synthetic.throw.scene import Scene
 from airborne.tracking.first_pose.moments import Moment, empty_scenes, look, spread_sample
 
-N_THROWS, N_PEOPLE, SEED = 12, 8, 9500
-TURNED_DEG = 4.0
+N_THROWS, N_PEOPLE, SEED = 12, 8, 9500  # chosen: how many scenes, from which seed on
+TURNED_DEG = 4.0  # chosen: that is seen in every scene
 
 
 def moments_of(scene: Scene) -> list[Moment]:
@@ -46,29 +44,19 @@ def moments_of(scene: Scene) -> list[Moment]:
 
 def with_mix_up(moments: Sequence[Moment], mix_up: MixUp) -> list[Moment]:
     """Return the moments as they are with a mix-up, which is undone as it is made."""
-    made = []
-    for moment in moments:
-        evidence: list[Any] = list(moment.evidence)
-        for i, image in zip(mix_up.cameras, mix_up.undo_images(moment.evidence), strict=True):
-            evidence[i] = image
-        made.append(replace(moment, evidence=tuple(evidence)))
-    return made
+    return [replace(moment, evidence=tuple(mix_up.undo_in(moment.evidence))) for moment in moments]
 
 
 def with_turned(moments: Sequence[Moment], number: int, seed: int) -> list[Moment]:
     """Return the moments with one camera's calibration turned about a random axis."""
     axis = np.random.default_rng(seed).normal(size=3)
     turn = Rotation.from_rotvec(np.radians(TURNED_DEG) * axis / np.linalg.norm(axis))
-    turned = RigidTransform.from_rotation(turn)
-
-    def turn_camera(camera: Camera) -> Camera:
-        return replace(camera, camera_from_world=turned * camera.camera_from_world)
-
-    made = []
+    turned, made = RigidTransform.from_rotation(turn), []
     for moment in moments:
         views = list(moment.frames.views)
         if (view := views[number]) is not None:
-            views[number] = replace(view, camera=turn_camera(view.camera))
+            camera = replace(view.camera, camera_from_world=turned * view.camera.camera_from_world)
+            views[number] = replace(view, camera=camera)
         made.append(replace(moment, frames=replace(moment.frames, views=tuple(views))))
     return made
 

@@ -52,13 +52,7 @@ RIGHT = moments()
 
 def mixed(mix_up):
     """The moments as they are with a mix-up, which is undone as it is made."""
-    made = []
-    for moment in RIGHT:
-        evidence = list(moment.evidence)
-        for i, image in zip(mix_up.cameras, mix_up.undo_images(moment.evidence), strict=True):
-            evidence[i] = image
-        made.append(replace(moment, evidence=tuple(evidence)))
-    return made
+    return [replace(moment, evidence=tuple(mix_up.undo_in(moment.evidence))) for moment in RIGHT]
 
 
 def test_videos_of_their_own_cameras_show_one_body():

@@ -60,6 +60,11 @@ def _create(folder: Path) -> Path:
     return folder
 
 
+def holds_run(folder: Path) -> bool:
+    """Tell whether a folder holds a run, finished or not."""
+    return (folder / MOTION).is_file() or (folder / JOINTS).is_file()
+
+
 def holds_players(folder: Path) -> bool:
     """Tell whether a folder holds a run of several players, finished or not."""
     return (folder / JOINTS).is_file() and not (folder / MOTION).is_file()
@@ -127,7 +132,7 @@ def _refuse_cut_table(table: Path, n: int, summary: dict[str, Any]) -> None:
 def read_summary(folder: Path) -> dict[str, Any]:
     """Read the summary of a finished run. Raises ResultError where it is missing or damaged."""
     path = folder / SUMMARY
-    if not path.exists() and ((folder / MOTION).is_file() or (folder / JOINTS).is_file()):
+    if not path.exists() and holds_run(folder):
         raise ResultError(
             f"{folder} has no {SUMMARY}: its run has not finished; go on with resume=True (airborne track --resume)"
         )

@@ -58,8 +58,8 @@ class Checks:
         self.well.append(line)
         self._report(line)
 
-    def attempt(self, read: Callable[[], _T], describe: Callable[[_T], str]) -> _T | None:
-        """Read something and describe it; None where it has a mistake."""
+    def attempt(self, read: Callable[[], _T], describe: Callable[[_T], str | None]) -> _T | None:
+        """Read something and describe it, unless nothing is to be said; None where it has a mistake."""
         try:
             value = read()
         except MistakesError as error:
@@ -67,7 +67,8 @@ class Checks:
         except AirborneError as error:
             self.mistakes.append(str(error))
         else:
-            self.add(describe(value))
+            if (line := describe(value)) is not None:
+                self.add(line)
             return value
         return None
 
@@ -192,7 +193,11 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             lambda _: f"start: not given; the {who} looked for when the trial is tracked",
         )
         if not trial.has_players and len(recording.rig) > 1:
-            _note_mix_ups(checks, trial, recording)
+            seen = checks.attempt(
+                lambda: _look_for_mix_ups(trial, recording),
+                lambda seen: None if seen.doubts else _ONE_BODY if seen.are_one_body else _UNDECIDED,
+            )
+            checks.doubts += [] if seen is None else seen.doubts
     elif trial.has_players:
         tracker = checks.attempt(
             lambda: players_tracker_of(trial, recording.rig),
@@ -229,21 +234,10 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         checks.add(f"note: {event}")
 
 
-def _note_mix_ups(checks: Checks, trial: Trial, recording: Recording) -> None:
-    """Look whether what moves in the videos is one body, and whether videos are mixed up."""
-
-    def look_for_mix_ups() -> MovingSilhouettes:
-        _, sample = look_at(trial, recording, _MOST_IMAGES)
-        return refuse_moving_mix_ups(look(sample, empty_scenes(sample)))
-
-    try:
-        seen = look_for_mix_ups()
-    except AirborneError as error:
-        checks.mistakes += error.mistakes if isinstance(error, MistakesError) else [str(error)]
-        return
-    checks.doubts += seen.doubts
-    if not seen.doubts:
-        checks.add(_ONE_BODY if seen.are_one_body else _UNDECIDED)
+def _look_for_mix_ups(trial: Trial, recording: Recording) -> MovingSilhouettes:
+    """Return what the silhouettes of what moves say; raises MistakesError where they speak of a mix-up."""
+    _, sample = look_at(trial, recording, _MOST_IMAGES)
+    return refuse_moving_mix_ups(look(sample, empty_scenes(sample)))
 
 
 def _exists(trial: Trial, name: str | None) -> bool:

@@ -180,7 +180,7 @@ def evaluate_agreement(
     _check_different("--repeat", (folder, *repeats), "another run")
     _check_different("--operator", (digitised or Path(), *operators), "another person's clicks")
     _check_same_videos(folder, repeats)
-    if out is not None and _holds_run(out) and not out.samefile(folder):
+    if out is not None and run_folder.holds_run(out) and not out.samefile(folder):
         raise ResultError(f"{out} holds another run, whose own comparisons lie there; give a folder without one")
     if holds_players(folder):
         if digitised or joints or joint_angles:
@@ -244,10 +244,6 @@ def _check_different(option: str, paths: Sequence[Path], wanted: str) -> None:
     for i, path in enumerate(paths):
         if resolved[i] in resolved[:i]:
             raise ResultError(f"{option} {path} would be compared with itself and agree perfectly; give {wanted}")
-
-
-def _holds_run(folder: Path) -> bool:
-    return (folder / run_folder.MOTION).is_file() or holds_players(folder)
 
 
 def _check_same_videos(folder: Path, repeats: Sequence[Path]) -> None:

@@ -90,8 +90,7 @@ def mix_ups_in(names: tuple[str, ...], images: list[Mask | None], silhouettes: l
         if is_new and all(other >= clear[i] for i, other in zip(concerned, crossed, strict=True)):
             what = _compare(names[concerned[0]], own[concerned[0]], crossed[0], mix_up.how(names))
             findings.append(mix_up.finding(names, what))
-            for i, image in zip(concerned, mix_up.undo_images(images), strict=True):
-                right[i] = image
+            right = mix_up.undo_in(right)
     agreements = zip(right, _agreements(right, silhouettes), strict=True)
     explained = [agreement for image, agreement in agreements if image is not None]
     return findings if findings and np.mean(explained) >= _LEAST_EXPLAINED else []
@@ -141,6 +140,13 @@ class MixUp:
         if self.is_exchange:
             return [images[i] for i in reversed(self.cameras)]
         return [None if (image := images[i]) is None else self._flip(image) for i in self.cameras]
+
+    def undo_in(self, images: Sequence[Mask | None]) -> list[Mask | None]:
+        """Return the images of all cameras as they would be without it."""
+        right = list(images)
+        for i, image in zip(self.cameras, self.undo_images(images), strict=True):
+            right[i] = image
+        return right
 
     def undo(self, frames: Frames) -> Frames | None:
         """Return frames with the images as they would be without it; None where one is missing or does not fit."""

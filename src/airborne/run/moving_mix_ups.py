@@ -5,7 +5,7 @@ Exchanged, mirrored or upside-down images are found as those without which the v
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -27,12 +27,12 @@ _LEAST_MIXED_UP, _MOST_UNCOVERED, _LEAST_ASKED = 0.1, 0.15, 0.3
 # refused, and without one, or a camera, that is asked about
 _OF_MIX_UP, _OF_DOUBT = (3.0, 2.0), (2.0, 1.5)
 
-
 _STILL = (
     "nothing is seen to move in the video of {camera}: does it show the body, and is it of this recording? Correct "
     "that, or leave it out (--cameras)"
 )
 
+_Seen = tuple[Moment, Sequence[Sequence[MovingRegion]]]  # a moment, and what moves in each of its views
 _Regions = Sequence[MovingRegion | None]  # the largest of each camera, None where it is cut by the image or none is
 
 
@@ -53,15 +53,15 @@ def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
 
     Raises MistakesError, naming the cameras, where they are those of one body only without a mix-up.
     """
-    chosen, doubts = _choose(moments), [_STILL.format(camera=name) for name in _still_cameras(moments)]
-    as_they_are = _median_uncovered(chosen)
+    seen = [(moment, moving_regions(moment)) for moment in moments]
+    chosen, doubts = _choose(seen), [_STILL.format(camera=name) for name in _still_cameras(seen)]
+    as_they_are = _median_uncovered(regions for _, regions in chosen)
     if not as_they_are >= _LEAST_MIXED_UP:
         return MovingSilhouettes(as_they_are, tuple(doubts))
     cameras = chosen[0][0]
     names = [camera.name for camera in cameras]
     mix_ups = [each for each in possible_mix_ups(len(names)) if len({cameras[i].size for i in each.cameras}) == 1]
-    without = [_median_uncovered([_undo(mix_up, *each) for each in chosen]) for mix_up in mix_ups]
-    left_out = [_median_uncovered([_leave_out(i, *each) for each in chosen]) for i in range(len(names))]
+    without = [_median_uncovered(_undo(mix_up, *each) for each in chosen) for mix_up in mix_ups]
     what = f"{as_they_are:.0%} of the silhouettes of what moves cannot be one body's"
     if (best := _clear_minimum(without, as_they_are, *_OF_DOUBT)) is not None:
         shows = f"{what}, and {without[best]:.0%} with {mix_ups[best].describe(names)}"
@@ -69,22 +69,25 @@ def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
             sentence = mix_ups[best].finding(names, shows).sentence
             raise MistakesError("the videos", [f"{sentence}; if that is not so, calibrate anew, or give [start]"])
         doubts.append(f"{shows}: are these videos right?")
-    elif as_they_are >= _LEAST_ASKED and (odd := _clear_minimum(left_out, as_they_are, *_OF_DOUBT)) is not None:
-        doubts.append(
-            f"{what}, but those without {names[odd]} can: is its video of this recording, and was it moved or "
-            "calibrated wrongly? Correct that, or leave it out (--cameras)"
-        )
+    elif as_they_are >= _LEAST_ASKED:
+        left_out = [
+            _median_uncovered([*regions[:i], *regions[i + 1 :]] for _, regions in chosen) for i in range(len(names))
+        ]
+        if (odd := _clear_minimum(left_out, as_they_are, *_OF_DOUBT)) is not None:
+            doubts.append(
+                f"{what}, but those without {names[odd]} can: is its video of this recording, and was it moved or "
+                "calibrated wrongly? Correct that, or leave it out (--cameras)"
+            )
     return MovingSilhouettes(as_they_are, tuple(doubts))
 
 
-def _still_cameras(moments: Sequence[Moment]) -> list[str]:
+def _still_cameras(seen: Sequence[_Seen]) -> list[str]:
     """Return the cameras in which nothing stands out at any moment, where something does in others."""
     moves: dict[str, bool] = {}
-    for moment in moments:
-        for view, nats in zip(moment.frames.views, moment.evidence, strict=True):
+    for moment, regions in seen:
+        for view, nats, own in zip(moment.frames.views, moment.evidence, regions, strict=True):
             if view is not None and nats is not None:
-                name = view.camera.name
-                moves[name] = moves.get(name, False) or bool(moving_regions(view.camera, nats))
+                moves[view.camera.name] = moves.get(view.camera.name, False) or bool(own)
     return [name for name, does in moves.items() if not does] if any(moves.values()) else []
 
 
@@ -95,30 +98,23 @@ def _clear_minimum(shares: Sequence[float], as_they_are: float, times: float, ti
     return int(best) if is_clear and shares[best] < _MOST_UNCOVERED else None
 
 
-def _median_uncovered(chosen: Sequence[tuple[Sequence[Camera], _Regions]]) -> float:
+def _median_uncovered(moments: Iterable[_Regions]) -> float:
     """Return what the visual hull leaves of the silhouettes of some moments; NaN with fewer than two at each."""
-    found = [[each for each in regions if each is not None] for _, regions in chosen]
+    found = [[each for each in regions if each is not None] for regions in moments]
     shares = [uncovered_share(each) for each in found if len(each) > 1]
     return float(np.median(shares)) if shares else np.nan
 
 
-def _leave_out(i: int, cameras: Sequence[Camera], regions: _Regions) -> tuple[Sequence[Camera], _Regions]:
-    return cameras, [None if k == i else region for k, region in enumerate(regions)]
-
-
-def _choose(moments: Sequence[Moment]) -> list[tuple[list[Camera], _Regions]]:
+def _choose(seen: Sequence[_Seen]) -> list[tuple[list[Camera], _Regions]]:
     """Return cameras and regions of some of the moments in which most of them see something move, two at least."""
-    found = []
-    for moment in moments:
-        views = [view for view in moment.frames.views if view is not None]
-        if len(views) < len(moment.frames.views):
-            continue
-        of_view = [
-            [] if nats is None else moving_regions(view.camera, nats)
-            for view, nats in zip(views, moment.evidence, strict=True)
-        ]
-        largest = [regions[0] if regions and not regions[0].is_cut else None for regions in of_view]
-        found.append(([view.camera for view in views], largest))
+    found = [
+        (
+            [view.camera for view in moment.frames.views if view is not None],
+            [own[0] if own and not own[0].is_cut else None for own in regions],
+        )
+        for moment, regions in seen
+        if None not in moment.frames.views
+    ]
     most = max((_count(regions) for _, regions in found), default=0)
     best = [each for each in found if _count(each[1]) == most > 1]
     return [best[i] for i in np.unique(np.linspace(0, len(best) - 1, _N_MOMENTS).round().astype(int))] if best else []
@@ -128,7 +124,7 @@ def _count(regions: _Regions) -> int:
     return sum(region is not None for region in regions)
 
 
-def _undo(mix_up: MixUp, cameras: Sequence[Camera], regions: _Regions) -> tuple[Sequence[Camera], _Regions]:
+def _undo(mix_up: MixUp, cameras: Sequence[Camera], regions: _Regions) -> _Regions:
     """Return the regions as they would be without a mix-up."""
     i, j = mix_up.cameras[0], mix_up.cameras[-1]
     right = list(regions)
@@ -145,4 +141,4 @@ def _undo(mix_up: MixUp, cameras: Sequence[Camera], regions: _Regions) -> tuple[
         else:
             corner, centre = (int(flipped[0]), region.corner[1]), np.array([centre[0], region.centre[1]])
             right[i] = replace(region, corner=corner, centre=centre, mask=region.mask[:, ::-1])
-    return cameras, right
+    return right

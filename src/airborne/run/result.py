@@ -17,7 +17,7 @@ from airborne.export.figures import flight_figure, joint_status_figure, joints_f
 from airborne.export.players_report import heights_figure
 from airborne.motion import Motion, PlayersMotion, measure_jumps, state_flight
 from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players, label_root
-from airborne.motion.run_folder import holds_players, read_body_run, read_players_run, read_summary
+from airborne.motion.run_folder import holds_players, holds_run, read_body_run, read_players_run, read_summary
 
 _FIGURES = {"joints": joints_figure, "joint_status": joint_status_figure, "flight": flight_figure}
 
@@ -38,7 +38,7 @@ class Run:
     folder: Path
 
     def __post_init__(self) -> None:
-        if not ((self.folder / "motion.csv").is_file() or self.has_players):
+        if not holds_run(self.folder):
             raise ResultError(f"{self.folder} holds no run; expected the output folder of a run")
 
     def __repr__(self) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.cameras import camera_looking_at
-from airborne.tracking.first_pose.places import moving_regions
+from airborne.tracking.first_pose.places import connected_regions
 from airborne.tracking.first_pose.visual_hull import uncovered_share
 
 SIZE = (320, 240)
@@ -21,7 +21,7 @@ def ball(camera, centre=CENTRE):
     directions = np.einsum("ij,hwj->hwi", np.linalg.inv(camera.K), np.stack([u, v, np.ones_like(u)], axis=-1))
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     at = camera.camera_from_world.apply(centre)
-    (region,) = moving_regions(
+    (region,) = connected_regions(
         camera, np.where(np.linalg.norm(np.cross(directions, at), axis=-1) < RADIUS_M, 3.0, -3.0).astype(np.float32)
     )
     return region

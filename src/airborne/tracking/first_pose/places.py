@@ -17,7 +17,7 @@ from airborne.types import Array, Mask
 
 _LEAST_SHARE = 1e-4  # of the picture that a region covers
 _MOST_REGIONS = 6  # of a view, the largest
-_NEAREST_M = 0.1  # to a camera that sees a place
+NEAREST_M = 0.1  # chosen: to a camera that sees a place
 _APART = 0.7  # body radii by which rays of one body's regions may miss each other
 
 
@@ -49,10 +49,7 @@ class Place:
 
 def find_places(moment: Moment, radius_m: float) -> list[Place]:
     """Find where something as large as a body of this radius may be, in most views and largest first."""
-    regions = [
-        [] if view is None or nats is None else moving_regions(view.camera, nats)
-        for view, nats in zip(moment.frames.views, moment.evidence, strict=True)
-    ]
+    regions = moving_regions(moment)
     seen = [view for view, own in enumerate(regions) if own]
     rig = Rig(tuple(regions[view][0].camera for view in seen))
     centres = [np.array([region.centre for region in regions[view]]) for view in seen]
@@ -101,10 +98,18 @@ def _distances_m(camera: Camera, centres: Array, points: Array) -> Array:
     depth_m = camera.camera_from_world.apply(points)[:, 2]
     off_px = camera.px_from_world(points)[:, None] - centres
     off_m = np.linalg.norm(off_px / np.diag(camera.K)[:2], axis=-1) * depth_m[:, None]
-    return np.where(depth_m[:, None] > _NEAREST_M, off_m, np.inf)
+    return np.where(depth_m[:, None] > NEAREST_M, off_m, np.inf)
 
 
-def moving_regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
+def moving_regions(moment: Moment) -> list[list[MovingRegion]]:
+    """Return the regions of each view that stand out, the largest first; none where nothing is known of it."""
+    return [
+        [] if view is None or nats is None else connected_regions(view.camera, nats)
+        for view, nats in zip(moment.frames.views, moment.evidence, strict=True)
+    ]
+
+
+def connected_regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
     """Return the regions of a view that stand out by their evidence (h, w) [nats], the largest first."""
     is_new = cv2.morphologyEx((nats > 0).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(is_new)

@@ -8,13 +8,12 @@ import cv2
 import numpy as np
 
 from airborne.cameras import Rig
-from airborne.tracking.first_pose.places import MovingRegion
+from airborne.tracking.first_pose.places import NEAREST_M, MovingRegion
 from airborne.types import Array
 
 # chosen: voxels along each edge of the cube, whose half edge is so many times the largest silhouette's reach
 _N_VOXELS, _MARGIN = 36, 1.1
 _BESIDE = 1.5  # chosen: voxels that one of the hull covers, as its silhouette's edge lies between them
-_NEAREST_M = 0.1  # to a camera that sees the body
 
 
 def uncovered_share(regions: Sequence[MovingRegion]) -> float:
@@ -26,7 +25,7 @@ def uncovered_share(regions: Sequence[MovingRegion]) -> float:
     rig = Rig(tuple(region.camera for region in regions))
     middle = rig.points_from_px(np.array([region.centre for region in regions]))
     depth_m = np.array([camera.camera_from_world.apply(middle)[2] for camera in rig])
-    if not (depth_m > _NEAREST_M).all():  # NaN, too
+    if not (depth_m > NEAREST_M).all():  # NaN, too
         return 1.0
     m_per_px = depth_m / np.array([camera.K[0, 0] for camera in rig])
     reach_m = _MARGIN * max(m * np.hypot(*region.mask.shape) / 2 for m, region in zip(m_per_px, regions, strict=True))
