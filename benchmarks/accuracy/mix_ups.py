@@ -24,9 +24,8 @@ from find_person import person
 from find_start import throw
 from rows import append
 
-from airborne.errors import MistakesError
 from airborne.run.mix_ups import MixUp, possible_mix_ups
-from airborne.run.moving_mix_ups import refuse_moving_mix_ups
+from airborne.run.moving_mix_ups import compare_silhouettes
 from airborne.synthetic.throw.pictures import scene_frames
 from airborne.synthetic.throw.scene import Scene
 from airborne.tracking.first_pose.moments import Moment, empty_scenes, look, spread_sample
@@ -72,11 +71,10 @@ def with_video_of(moments: Sequence[Moment], other: Sequence[Moment], number: in
 def verdict(moments: Sequence[Moment], names: Sequence[str], mix_up: MixUp | None = None, odd: str = "") -> str:
     """Return refused or asked, where what is wrong is named so, else wrong or silent."""
     right = mix_up.describe(names) if mix_up is not None else f"without {odd} "
-    try:
-        doubts = refuse_moving_mix_ups(moments).doubts
-    except MistakesError as error:
-        return "refused" if mix_up is not None and right in str(error) else "wrong"
-    if not doubts:
+    found = compare_silhouettes(moments)
+    if found.mix_up is not None:
+        return "refused" if mix_up is not None and right in found.mix_up else "wrong"
+    if not (doubts := found.doubts):
         return "silent"
     return "asked" if right in " ".join(doubts) and (odd or mix_up is not None) else "wrong"
 

@@ -15,6 +15,7 @@ from airborne.cli import main
 from airborne.errors import MistakesError, ResultError
 from airborne.run import check
 from airborne.run.check import check_trial
+from airborne.run.moving_mix_ups import MovingSilhouettes
 from airborne.run.track import track_trial
 from airborne.tracking.first_pose.body_size import WrongSize
 from airborne.trial.file import read_trial
@@ -115,6 +116,12 @@ def test_exchanged_videos_and_a_mirrored_one_are_named_before_anything_is_tracke
     with pytest.raises(MistakesError, match="the videos of cam2 and cam3, or their calibrations, are exchanged"):
         track_trial(read_trial(folder / "trial.toml"), folder / "out")
     assert not (folder / "out").exists()
+
+
+def test_a_video_whose_silhouettes_are_another_bodys_is_a_doubt_where_a_start_is_given_too(folder, monkeypatch):
+    seen = MovingSilhouettes(0.5, ("those without cam2 can",), "the images of cam3 are mirrored")
+    monkeypatch.setattr(check, "look_at_silhouettes", lambda trial, recording: seen)
+    assert check_trial(folder / "trial.toml").doubts == [seen.mix_up, *seen.doubts]
 
 
 def test_a_start_past_the_end_is_a_mistake(folder):

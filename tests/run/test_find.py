@@ -203,7 +203,7 @@ def test_no_start_is_said_to_be_certain(probability, says):
 @pytest.mark.usefixtures("searched")
 def test_what_makes_the_videos_doubtful_is_said_with_the_start_and_where_none_is_decided(path, tmp_path, monkeypatch):
     doubtful = MovingSilhouettes(0.5, ("those without cam2 can: was it moved?",))
-    monkeypatch.setattr(find, "refuse_moving_mix_ups", lambda moments: doubtful)
+    monkeypatch.setattr(find, "compare_silhouettes", lambda moments: doubtful)
     found = find.find_start(read_trial(path), tmp_path)
     assert found.notes[0].startswith("[start] was found")
     assert found.notes[1:] == doubtful.doubts

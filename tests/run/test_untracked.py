@@ -11,7 +11,8 @@ from airborne.body.shaping import with_size
 from airborne.cameras import Rig
 from airborne.run import untracked
 from airborne.run.mix_ups import MixUp, _silhouette, find_undecided_mix_ups, possible_mix_ups
-from airborne.run.untracked import explain_untracked
+from airborne.run.moving_mix_ups import MovingSilhouettes
+from airborne.run.untracked import explain_by_silhouettes, explain_untracked
 from airborne.tracking.methods import Settings
 from airborne.video import VideoFacts
 from tests.support.scenes import CAMERAS, CROSS, Scene
@@ -141,3 +142,13 @@ def test_a_mix_up_with_a_camera_without_an_image_is_not_undone():
     dark = Scene(cameras=CAMERAS[:3], is_dark=lambda index, name: name == NAMES[0]).frames(0)
     undone = [mix_up.undo(dark) is not None for mix_up in possible_mix_ups(len(NAMES))]
     assert undone == [0 not in mix_up.cameras for mix_up in possible_mix_ups(len(NAMES))]
+
+
+def test_what_moves_explains_it_before_anything_is_tracked_anew():
+    mix_up = explain_by_silhouettes(MovingSilhouettes(0.5, ("those without cam2 can",), "cam1 is mirrored"))
+    assert mix_up == ("cam1 is mirrored", True)
+    assert explain_by_silhouettes(MovingSilhouettes(0.5, ("those without cam2 can",))) == (
+        "those without cam2 can",
+        False,
+    )
+    assert explain_by_silhouettes(MovingSilhouettes(0.05)) is None

@@ -13,7 +13,7 @@ import typer
 
 from airborne.cli.console import Json, Out, progress, stop
 from airborne.cli.results import evaluate_command
-from airborne.errors import AirborneError, count, format_digits
+from airborne.errors import AirborneError, count, count_of, format_digits
 from airborne.io.terminal import Stages
 
 if TYPE_CHECKING:
@@ -170,13 +170,16 @@ def _track(
 
 def _describe_self_check(summary: dict) -> str | None:
     """Say what the self-check found; alarms are among the notes."""
-    findings = summary.get("self_check")
-    if not findings or summary["n_frames"] in (summary["n_lost"], 1):
+    findings, n = summary.get("self_check"), summary["n_frames"]
+    if findings is None or n in (summary["n_lost"], 1):
         return None
     if any(each["is_alarm"] for each in findings):
         return "self-check: something is wrong, see the notes"
-    if not summary["n_tracked"]:
-        return "self-check: no frame is tracked, so it says nothing of body, cameras and times"
+    if summary["n_tracked"] < n / 2:
+        tracked = count_of(summary["n_tracked"], n, "frame")
+        return f"self-check of sizes, cameras and times: {tracked} tracked, too few to say that nothing is wrong"
+    if not findings:
+        return None
     said = "; ".join(each["sentence"] for each in findings[:2])
     return f"self-check of sizes, cameras and times: nothing seems wrong; {said}"
 

@@ -30,9 +30,10 @@ from airborne.run.drawing import DrawingThread
 from airborne.run.first_pose import find_first_pose, out_of_sight
 from airborne.run.key_misses import far_keys
 from airborne.run.keys import keys_of_frames
+from airborne.run.moving_mix_ups import look_at_silhouettes
 from airborne.run.opening import Opened
 from airborne.run.self_check import check_run
-from airborne.run.untracked import explain_untracked
+from airborne.run.untracked import explain_by_silhouettes, explain_untracked
 from airborne.run.wrong_colours import find_wrong_colours
 from airborne.tracking import Estimate, Status
 from airborne.tracking.evidence import PoseEvidence
@@ -55,6 +56,8 @@ _UNCERTAINTY = (
     "times. They do not include wrong lengths and girths of single segments."
 )
 _CALIBRATION_UNCERTAINTY = " They include a shift of each camera's whole image due to calibration."
+
+_HARDLY_ANY = 0.1  # chosen: of the frames: so few are tracked that the run says nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,10 +234,13 @@ class BodyRun:
         findings = [*([measured.wrong_fall.to_dict()] if measured.wrong_fall else []), *checked.findings]
         of_colours = find_wrong_colours(model, motion, self.kept)
         self.recording.events.extend([*checked.doubts, *of_colours, *far_keys(self.trial, model, motion, rig)])
-        if not motion.count(Status.TRACKED) and len(motion) > 1 and not checked.is_start_wrong:
-            args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
-            self.recording.events.append((why := explain_untracked(*args)).sentence)
-            findings = [] if why.is_mix_up else findings
+        if motion.count(Status.TRACKED) <= _HARDLY_ANY * len(motion) and len(motion) > 1 and not checked.is_start_wrong:
+            seen = look_at_silhouettes(self.trial, self.recording) if self.found is None else self.found.silhouettes
+            if (why := explain_by_silhouettes(seen)) is None:
+                args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
+                why = explain_untracked(*args)
+            self.recording.events.extend([why.sentence] if why.sentence not in self.recording.events else [])
+            findings = [] if why.is_mix_up else [each for each in findings if each["is_alarm"]]
         return motion, {
             "name": self.trial.name,
             **headline(motion),

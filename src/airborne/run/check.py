@@ -12,11 +12,11 @@ from typing import TypeVar
 
 from airborne.errors import AirborneError, MistakesError, TrialError, count
 from airborne.run.detections import read_trial_detections
-from airborne.run.find import look_at, require_two_cameras
+from airborne.run.find import require_two_cameras
 from airborne.run.first_pose import OUT_OF_SIGHT, find_first_pose, out_of_sight
 from airborne.run.keys import keys_of_frames
 from airborne.run.mix_ups import find_undecided_mix_ups, refuse_mix_ups, refuse_same_files, start_foregrounds
-from airborne.run.moving_mix_ups import MovingSilhouettes, refuse_moving_mix_ups
+from airborne.run.moving_mix_ups import MovingSilhouettes, look_at_silhouettes, refuse_moving_mix_ups
 from airborne.run.opening import (
     Opened,
     dark_start_error,
@@ -28,7 +28,6 @@ from airborne.run.opening import (
 )
 from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
-from airborne.tracking.first_pose.moments import empty_scenes, look
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
@@ -40,7 +39,6 @@ _DIM_LEVEL = 2 * DARK_LEVEL  # chosen: an image at 6 % of its brightness has no 
 _NO_MIX_UP = "videos: no sign at the start that cameras' videos were exchanged"
 _UNDECIDED = "videos: what moves does not show whether any were exchanged or mirrored; tracking may show it"
 _ONE_BODY = "videos: what moves in them looks like one body seen by all cameras"
-_MOST_IMAGES = 300  # chosen: of each camera that are looked at where no start is given, a few seconds' work
 
 
 class Checks:
@@ -230,14 +228,17 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
                         lambda: refuse_mix_ups(*seen),
                         lambda _: _UNDECIDED if find_undecided_mix_ups(*seen) else _NO_MIX_UP,
                     )
+                silhouettes = look_at_silhouettes(trial, recording)
+                checks.doubts += [*filter(None, [silhouettes.mix_up]), *silhouettes.doubts]
     for event in recording.events:
         checks.add(f"note: {event}")
 
 
 def _look_for_mix_ups(trial: Trial, recording: Recording) -> MovingSilhouettes:
     """Return what the silhouettes of what moves say; raises MistakesError where they speak of a mix-up."""
-    _, sample = look_at(trial, recording, _MOST_IMAGES)
-    return refuse_moving_mix_ups(look(sample, empty_scenes(sample)))
+    silhouettes = look_at_silhouettes(trial, recording)
+    refuse_moving_mix_ups(silhouettes)
+    return silhouettes
 
 
 def _exists(trial: Trial, name: str | None) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,12 +18,12 @@ from airborne.export import write_json
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.io.folder_lock import refuse_links
 from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE, figures_of
-from airborne.run.moving_mix_ups import refuse_moving_mix_ups
-from airborne.run.opening import open_cameras, past_the_end_error, video_source
+from airborne.run.moving_mix_ups import MovingSilhouettes, compare_silhouettes, refuse_moving_mix_ups
+from airborne.run.sample import look_through
 from airborne.tracking import Status
 from airborne.tracking.backward import turn_time
 from airborne.tracking.first_pose.candidates import Candidate, StartSearch, find_thing
-from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, source_of, spread_sample
+from airborne.tracking.first_pose.moments import SourceKey, empty_scenes, look, source_of
 from airborne.tracking.first_pose.person_candidates import find_person
 from airborne.tracking.first_pose.players import PlayersSearch
 from airborne.tracking.methods import sample_body_colours
@@ -32,11 +32,10 @@ from airborne.tracking.tracker import track_frames
 from airborne.trial.file import Trial
 from airborne.trial.start import StartTable
 from airborne.types import Progress
-from airborne.video import Frames, Recording, VideoFacts, open_recording
+from airborne.video import Frames, Recording, VideoFacts
 
 AnySearch = TypeVar("AnySearch", StartSearch, PlayersSearch)
 
-_MOST_IMAGES = 1500  # of each camera that are looked at
 _SURE = 0.99  # a higher probability rests on assumptions that are less sure themselves
 _MOST_BYTES = 4e8  # of decoded pictures that are kept to track back through
 
@@ -50,13 +49,19 @@ class FoundStart:
     finding: StartSearch
     scenes: Mapping[SourceKey, EmptyScene]
     facts: tuple[VideoFacts, ...]
-    notes: tuple[str, ...]  # what the user should know, one line each
+    how: str  # it was found, one line
+    silhouettes: MovingSilhouettes  # what they say of the videos
 
     @property
     def start(self) -> dict[str, Any]:
         """The [start] as a trial file has it."""
         angles = ["joint_angles_deg"] if self.model.has_joints else []
         return self.trial.start.model_dump(include={"frame", "position_m", "quaternion_xyzw", *angles})
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know, one line each."""
+        return self.how, *self.silhouettes.doubts
 
     def draw(self, folder: Path) -> None:
         """Draw the empty scene, what stands out from it and the body there."""
@@ -87,7 +92,8 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
             f"{FEWEST_PICTURES} at least; give the pose under [start]"
         )
     moments = look(sample, scenes)
-    silhouettes = refuse_moving_mix_ups(moments)
+    silhouettes = compare_silhouettes(moments)
+    refuse_moving_mix_ups(silhouettes)
     finding = (find_person if model.has_joints else find_thing)(model, moments, progress)
     if take is not None:
         finding = take_candidate(trial, finding, take)
@@ -97,15 +103,13 @@ def find_start(trial: Trial, folder: Path, *, take: int | None = None, progress:
     frame, pose = _track_back(trial, model, recording, finding, progress)
     pose = least_turned_pose(model, pose)
     chosen = "was found" if take is None else f"is candidate {take}, as --take says"
-    note = (
+    how = (
         f"[start] {chosen}: the body stands out best in frame {finding.moment.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     if len(symmetries(model)) > 1:
-        note += "; turned poses of this body look alike, and of them this is turned least from the world's axes"
-    return FoundStart(
-        _with_start(trial, model, frame, pose), model, finding, scenes, facts, (note, *silhouettes.doubts)
-    )
+        how += "; turned poses of this body look alike, and of them this is turned least from the world's axes"
+    return FoundStart(_with_start(trial, model, frame, pose), model, finding, scenes, facts, how, silhouettes)
 
 
 def describe_probability(probability: float) -> str:
@@ -118,44 +122,6 @@ def require_two_cameras(trial: Trial) -> None:
     if len(trial.camera) < 2:
         what, give = ("players", "[[start.player]]") if trial.has_players else ("the body", "its pose")
         raise TrialError(f"{trial.name}: [start] is missing; finding {what} needs two cameras: give {give}")
-
-
-def look_through(trial: Trial, progress: Progress | None) -> tuple[Recording, tuple[VideoFacts, ...], list[Frames]]:
-    """Open the videos and look at moments spread over them, small; raises TrialError where there are none."""
-    cameras = open_cameras(trial)
-    sources = [video_source(trial, camera) for camera in trial.camera]
-    recording = open_recording(sources, cameras.rig, facts=cameras.facts, every=trial.track.every)
-    recording, sample = look_at(trial, recording, _MOST_IMAGES, progress)
-    return recording, cameras.facts, sample
-
-
-def look_at(
-    trial: Trial, recording: Recording, most_images: int, progress: Progress | None = None
-) -> tuple[Recording, list[Frames]]:
-    """Look at moments of an opened recording, small; return what of it was looked at, too.
-
-    Images are converted only where they are used. Raises TrialError where there are none.
-    """
-    start = trial.start.frame
-    stop = start + most_images
-    if trial.track.stop is not None:
-        stop = max(min(stop, trial.track.stop), start + 1)
-    recording = replace(recording, start=start, stop=stop, is_lazy=True)
-    sample = spread_sample(_report_each(recording, progress), recording.n_frames)
-    if not sample:
-        raise past_the_end_error(trial, recording)
-    return recording, sample
-
-
-def _report_each(recording: Recording, progress: Progress | None) -> Iterator[Frames]:
-    """Yield the frames, and report how many were; after the last, that how much is left is unknown."""
-    number = 0
-    for number, frames in enumerate(recording, start=1):
-        if progress is not None:
-            progress(number, recording.n_frames)
-        yield frames
-    if progress is not None:
-        progress(number, None)
 
 
 def take_candidate(trial: Trial, finding: AnySearch, number: int) -> AnySearch:

@@ -14,11 +14,11 @@ from airborne.motion.run_folder import CANDIDATES, CANDIDATES_PICTURE
 from airborne.run.find import (
     describe_probability,
     frames_up_to,
-    look_through,
     open_candidates,
     require_two_cameras,
     take_candidate,
 )
+from airborne.run.sample import look_through
 from airborne.tracking import Status
 from airborne.tracking.backward import turn_time
 from airborne.tracking.capsules import Blocker

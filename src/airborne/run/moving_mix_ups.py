@@ -14,10 +14,14 @@ import numpy as np
 from airborne.cameras import Camera
 from airborne.errors import MistakesError
 from airborne.run.mix_ups import MixUp, possible_mix_ups
-from airborne.tracking.first_pose.moments import Moment
+from airborne.run.sample import look_at
+from airborne.tracking.first_pose.moments import Moment, empty_scenes, look
 from airborne.tracking.first_pose.places import MovingRegion, moving_regions
 from airborne.tracking.first_pose.visual_hull import uncovered_share
+from airborne.trial.file import Trial
+from airborne.video import Recording
 
+_MOST_IMAGES = 300  # chosen: of each camera that are looked at where no start is looked for, a few seconds' work
 _N_MOMENTS = 6  # chosen: spread over those in which most cameras see something move
 # Chosen on people 8000, 8001 and 8008 to 8013 and throws 8000 to 8008 of `benchmarks/accuracy/mix_ups.py`, of which one
 # body's silhouettes were uncovered by up to 0.23. Shares of them: from which on a mix-up is looked for; below which
@@ -41,6 +45,7 @@ class MovingSilhouettes(NamedTuple):
 
     uncovered: float  # share of them that cannot be one body's; NaN where two cameras see nothing whole
     doubts: tuple[str, ...] = ()  # what seems wrong with the videos, one line each
+    mix_up: str | None = None  # what is wrong with them, where without it they are one body's for sure
 
     @property
     def are_one_body(self) -> bool:
@@ -48,11 +53,20 @@ class MovingSilhouettes(NamedTuple):
         return self.uncovered < _MOST_UNCOVERED
 
 
-def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
-    """Return what the silhouettes of what moves say.
+def look_at_silhouettes(trial: Trial, recording: Recording) -> MovingSilhouettes:
+    """Return what the silhouettes of what moves in an opened recording say; looks at some of its images, small."""
+    _, sample = look_at(trial, recording, _MOST_IMAGES)
+    return compare_silhouettes(look(sample, empty_scenes(sample)))
 
-    Raises MistakesError, naming the cameras, where they are those of one body only without a mix-up.
-    """
+
+def refuse_moving_mix_ups(silhouettes: MovingSilhouettes) -> None:
+    """Raise MistakesError, naming the cameras, where silhouettes are those of one body only without a mix-up."""
+    if silhouettes.mix_up is not None:
+        raise MistakesError("the videos", [f"{silhouettes.mix_up}; if that is not so, calibrate anew, or give [start]"])
+
+
+def compare_silhouettes(moments: Sequence[Moment]) -> MovingSilhouettes:
+    """Return what the silhouettes of what moves say: compared with each other, as they are and without mix-ups."""
     seen = [(moment, moving_regions(moment)) for moment in moments]
     chosen, doubts = _choose(seen), [_STILL.format(camera=name) for name in _still_cameras(seen)]
     as_they_are = _median_uncovered(regions for _, regions in chosen)
@@ -66,8 +80,7 @@ def refuse_moving_mix_ups(moments: Sequence[Moment]) -> MovingSilhouettes:
     if (best := _clear_minimum(without, as_they_are, *_OF_DOUBT)) is not None:
         shows = f"{what}, and {without[best]:.0%} with {mix_ups[best].describe(names)}"
         if best == _clear_minimum(without, as_they_are, *_OF_MIX_UP):
-            sentence = mix_ups[best].finding(names, shows).sentence
-            raise MistakesError("the videos", [f"{sentence}; if that is not so, calibrate anew, or give [start]"])
+            return MovingSilhouettes(as_they_are, tuple(doubts), mix_ups[best].finding(names, shows).sentence)
         doubts.append(f"{shows}: are these videos right?")
     elif as_they_are >= _LEAST_ASKED:
         left_out = [

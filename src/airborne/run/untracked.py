@@ -1,4 +1,4 @@
-"""A run of a body of which no frame is tracked: which mix-up, which camera or which size of the body explains that."""
+"""A run of which hardly a frame is tracked: which mix-up, which camera or which size of the body explains that."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from airborne.body import BodyModel, Pose
 from airborne.body.shaping import with_size
 from airborne.run.mix_ups import MixUp, find_undecided_mix_ups, start_foregrounds
+from airborne.run.moving_mix_ups import MovingSilhouettes
 from airborne.tracking import Estimate, Status
 from airborne.tracking.methods import Settings, tracker_of
 from airborne.tracking.tracker import track_frames
@@ -52,6 +53,13 @@ class _Change:
     mix_up: MixUp | None = None
     camera: str | None = None  # that is left out
     size: float | None = None  # of the body, as a share of its own
+
+
+def explain_by_silhouettes(seen: MovingSilhouettes) -> Explanation | None:
+    """Say what the silhouettes of what moves show to be wrong with the videos; None where they show nothing."""
+    if seen.mix_up is not None:
+        return Explanation(seen.mix_up, True)
+    return Explanation(seen.doubts[0], False) if seen.doubts else None
 
 
 def explain_untracked(
