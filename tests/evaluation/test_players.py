@@ -21,6 +21,8 @@ from tests.support.tolerances import ROUNDTRIP, sampled
 
 JUMPER = Jumper()
 TRUTH = motion_of(JUMPER)
+OTHER_SIDE = {name: name.replace("left", "right") for name in TRUTH.joints if name.endswith("left")}
+OTHER_SIDE |= {other: name for name, other in OTHER_SIDE.items()}
 STILL = players_motion(np.arange(40) / 60, np.repeat(JUMPER.points()[:1, None, :6], 40, axis=0))
 
 
@@ -145,9 +147,44 @@ def test_text_holds_no_nan_and_names_what_has_no_partner():
     assert " time; not recovered" in text
 
 
+def test_a_player_by_another_name_is_the_one_who_stands_there():
+    found = replace(STILL, players=("player1",), points=STILL.points + 0.03)
+    assert list(compare_players(found, STILL).players) == ["one"]
+    points = np.concatenate([STILL.points, STILL.points + np.array([1.0, 0.0, 0.0])], axis=1)
+    pair = replace(players_motion(STILL.time_s, points), players=("one", "two"))
+    other_order = replace(pair, points=pair.points[:, ::-1], players=("player1", "player2"))
+    errors = compare_players(other_order, pair).players
+    assert [each.parts["all"].mean_mm for each in errors.values()] == [0.0, 0.0]
+
+
+def test_a_truth_that_is_near_is_not_asked_about():
+    assert compare_players(replace(STILL, points=STILL.points + 0.05), STILL).questions == ()
+    assert compare_players(TRUTH, TRUTH).questions == ()
+
+
+@pytest.mark.parametrize(
+    ("truth", "question"),
+    [
+        (replace(TRUTH, points=1e3 * TRUTH.points), "are its numbers millimetres that are read as metres?"),
+        (replace(TRUTH, time_s=TRUTH.time_s + 3 / 60), "with -50.0 ms added to the truth's times"),
+        (replace(TRUTH, points=TRUTH.points + 1.1), "is it of this recording"),
+        (
+            replace(TRUTH, joints=tuple(map(OTHER_SIDE.get, TRUTH.joints))),
+            "left and right exchanged",
+        ),
+    ],
+    ids=["millimetres", "late", "of another recording", "sides"],
+)
+def test_a_truth_that_is_far_is_asked_about(truth, question):
+    found = compare_players(TRUTH, truth)
+    (asked,) = found.questions
+    assert question in asked
+    assert found.describe().splitlines()[-1] == asked
+
+
 def test_other_recordings_are_refused_in_one_line():
     with pytest.raises(ResultError, match="no player in common: the run has two, the truth one"):
-        compare_players(replace(STILL, players=("two",)), STILL)
+        compare_players(replace(STILL, players=("two",), points=STILL.points + 0.6), STILL)
     with pytest.raises(ResultError, match="no frame to compare"):
         compare_players(replace(STILL, time_s=STILL.time_s + 9), STILL)
 

@@ -93,7 +93,11 @@ def test_a_truth_of_players_in_millimetres_is_asked_about(tmp_path, capsys):
     scaled = [line if k == 0 else line[:3] + [str(1e3 * float(x)) for x in line[3:]] for k, line in enumerate(lines)]
     truth.write_text("\n".join(map(",".join, scaled)) + "\n")
     assert in_process("evaluate", run, truth) == 0
-    assert "is it in millimetres? Tables hold metres" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "are its numbers millimetres that are read as metres?" in said.out
+    assert said.err == "airborne: doubt: what was found against the truth is doubtful: see the question there\n"
+    assert "Doubtful: " in (run / "agreement_methods.txt").read_text()
+    assert json.loads((run / "summary.json").read_text())["truth"]["questions"]
 
 
 def test_a_truth_given_as_joints_is_refused_in_one_line(run, thrown_cross):

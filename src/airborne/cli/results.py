@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from airborne.cli.console import Json
+from airborne.io.terminal import errors
 
 _AGAINST = {
     "truth": "against the truth",
@@ -68,6 +69,7 @@ def evaluate_command(
         repeats=repeat or (),
         operators=operator or (),
         out=output,
+        comparisons=comparisons,
     )
     if as_json:
         print(
@@ -80,3 +82,6 @@ def evaluate_command(
     print(agreement.describe())
     if (note := note_if_unfinished(results)) is not None:
         print(f"note: {note}")
+    if doubtful := [_AGAINST[name] for name, comparison in comparisons.items() if comparison.questions]:
+        said = f"what was found {' and '.join(doubtful)} is doubtful: see the question there"
+        errors.print(f"airborne: doubt: {said}", style="yellow", markup=False)

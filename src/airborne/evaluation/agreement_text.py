@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TypeVar
 
 from airborne.evaluation.agreement import Agreement
@@ -70,15 +71,17 @@ def methods_text(
     agreements: Mapping[str, Sequence[Agreement]],
     repeatabilities: Mapping[str, Sequence[Repeatability]],
     versions: Mapping[str, str],
+    *,
+    questions: Mapping[str, Sequence[str]] = MappingProxyType({}),
     earlier: str = "",
 ) -> str:
     """Return a paragraph for a methods section, its results, and its references; numbers with 95 % intervals.
 
-    `agreements` and `repeatabilities` hold the headline variables by what they were compared with. Of an `earlier`
-    text, the results of comparisons with something else stay.
+    `agreements` and `repeatabilities` hold the headline variables by what they were compared with, `questions` what is
+    asked about these. Of an `earlier` text, the results of comparisons with something else stay.
     """
     results = _results_of(earlier)
-    results |= _paragraphs(_AGAINST, agreements, _agreement_sentence)
+    results |= _paragraphs(_AGAINST, agreements, _agreement_sentence, questions)
     results |= _paragraphs(_BETWEEN, repeatabilities, _repeat_sentence)
     software = ", ".join(f"{name} {version}" for name, version in versions.items())
     text = [
@@ -113,9 +116,17 @@ def methods_text(
     return "\n\n".join([said, *results.values(), "\n".join(["References", *references])]) + "\n"
 
 
-def _paragraphs(begin: str, results: Mapping[str, Sequence[_Row]], say: Callable[[_Row], str]) -> dict[str, str]:
-    heads = {f"{begin}{name}:": rows for name, rows in results.items()}
-    return {head: "\n".join([head, *map(say, rows)]) for head, rows in heads.items()}
+def _paragraphs(
+    begin: str,
+    results: Mapping[str, Sequence[_Row]],
+    say: Callable[[_Row], str],
+    questions: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> dict[str, str]:
+    paragraphs = {}
+    for name, rows in results.items():
+        doubts = [f"Doubtful: {question}" for question in questions.get(name, ())]
+        paragraphs[head] = "\n".join([head := f"{begin}{name}:", *doubts, *map(say, rows)])
+    return paragraphs
 
 
 def _results_of(text: str) -> dict[str, str]:

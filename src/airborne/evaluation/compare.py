@@ -87,7 +87,24 @@ class MotionComparison:
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
-        return nan_to_none(asdict(self))
+        return nan_to_none(asdict(self) | {"questions": list(self.questions)})
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """What is asked about the reference where it is far from the motion, one line each."""
+        if self.mix_up:
+            return (self.mix_up,)
+        asked = []
+        for name, share in (("position", self.position_calibration), ("rotation", self.rotation_calibration)):
+            if share.n and share.within_2sd < _HARDLY_ANY:
+                question = _TRANSPOSED if name == "rotation" and self.is_transposed else _ANOTHER
+                asked.append(f"hardly any {name} lies within 2 sd: {question}?")
+        if self.better_shift_s:
+            asked.append(
+                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, the RMS in space would be "
+                f"{self.better_rms_3d_mm:.2f} mm: do both clocks start at the same frame?"
+            )
+        return tuple(asked)
 
     def describe(self) -> str:
         """Return the numbers as a short plain table."""
@@ -126,17 +143,7 @@ class MotionComparison:
                     f"{name} errors within 1 sd {share.within_1sd:.0%} (normal: 68%), "
                     f"within 2 sd {share.within_2sd:.0%} (95%), n = {share.n}"
                 )
-            if share.n and share.within_2sd < _HARDLY_ANY and not self.mix_up:
-                question = _TRANSPOSED if name == "rotation" and self.is_transposed else _ANOTHER
-                lines.append(f"hardly any {name} lies within 2 sd: {question}?")
-        if self.mix_up:
-            lines.append(self.mix_up)
-        elif self.better_shift_s:
-            lines.append(
-                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, the RMS in space would be "
-                f"{self.better_rms_3d_mm:.2f} mm: do both clocks start at the same frame?"
-            )
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.questions])
 
 
 def _rows(names: Sequence[str], rms: Sequence[float], largest: Sequence[float]) -> list[tuple[str, str, str]]:

@@ -62,6 +62,11 @@ class DigitisedComparison:
             **({"points_left_out": list(self.left_out)} if self.left_out else {}),
         }
 
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """What is asked about the clicked points where they are far from the motion, one line each."""
+        return self.tracked_minus_digitised.questions
+
     def describe(self) -> str:
         """Return the numbers as a short plain table."""
         fit = f"{self.n_poses} digitised poses; rigid fit residual RMS {self.rigid_fit_residual_rms_mm:.2f} mm"

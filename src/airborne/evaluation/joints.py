@@ -73,7 +73,21 @@ class JointComparison:
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
-        return nan_to_none(asdict(self))
+        return nan_to_none(asdict(self) | {"questions": list(self.questions)})
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """What is asked about the reference where it is far from the landmarks, one line each."""
+        if self.mix_up:
+            return (self.mix_up,)
+        if self.better_shift_s:
+            return (
+                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
+                f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?",
+            )
+        if min(self.whole.mean_without_offset_mm, self.whole.mean_without_bias_mm) > _ELSEWHERE_MM:
+            return ("the paths are nowhere near these joints: are they of this recording?",)
+        return ()
 
     def describe(self) -> str:
         """Return the numbers as a short plain table."""
@@ -89,15 +103,6 @@ class JointComparison:
             table.append((f"  {name}", *(or_dash(number, ".1f") for number in numbers)))
         lines += align_columns(table, (18, 9, 9, 9, 11))
         lines.append("no offset: the mean without a constant offset in the segment, as between two definitions")
-        if self.mix_up:
-            lines.append(self.mix_up)
-        elif self.better_shift_s:
-            lines.append(
-                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
-                f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?"
-            )
-        elif min(self.whole.mean_without_offset_mm, self.whole.mean_without_bias_mm) > _ELSEWHERE_MM:
-            lines.append("the paths are nowhere near these joints: are they of this recording?")
         share = self.calibration
         if share.n:
             lines.append(
@@ -113,7 +118,7 @@ class JointComparison:
         lines.append(f"joints tracked: {self.share_tracked:.0%}; of these more than 100 mm off: {self.n_far}")
         if self.not_compared:
             lines.append(f"not compared: {', '.join(self.not_compared)}")
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.questions])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -56,13 +56,10 @@ def question_mix_up(run: Paths, reference: Paths, names: Sequence[str] = ()) -> 
         if near_mm < min(NEAR_MM, far_mm / _NEARER):
             distances = f"{near_mm:.0f} mm from the run, not {far_mm:.0f} mm"
             return f"with {way.done} the reference would lie {distances}: {way.question}?"
-    return _question_times(run.time_s, reference.time_s) or "".join(question_units(far_mm))
-
-
-def question_units(distance_mm: float) -> list[str]:
-    """Ask in one line whether a reference so far away is in millimetres; nothing where it is near."""
-    far = f"the reference lies {distance_mm / 1e3:.0f} m from the run; is it in millimetres? Tables hold metres"
-    return [far] if distance_mm > _FAR_MM else []
+    if question := _question_times(run.time_s, reference.time_s):
+        return question
+    far = f"the reference lies {far_mm / 1e3:.0f} m from the run; is it in millimetres? Tables hold metres"
+    return far if far_mm > _FAR_MM else ""
 
 
 def _other_ways(run: Paths, reference: Paths, names: Sequence[str]) -> Iterator[_Way]:

@@ -13,7 +13,7 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError, count
 from airborne.evaluation.compare import nan_to_none, or_dash
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
-from airborne.evaluation.mix_ups import question_units
+from airborne.evaluation.players_questions import name_by_place, question_players
 from airborne.evaluation.players_truth import read_players_truth, read_reference_jumps
 from airborne.evaluation.success import Cover, success_cover
 from airborne.evaluation.times import match_times, span
@@ -74,6 +74,7 @@ class PlayersComparison:
     players: dict[str, PlayerErrors]
     jumps: tuple[JumpErrors, ...]
     not_compared: tuple[str, ...]  # players without truth, and joints in only one of the two
+    questions: tuple[str, ...]  # about the truth's unit, axes, sides, clock or recording, where it is far
 
     def to_dict(self) -> dict:
         """Return the numbers for a JSON file; what is unknown is None."""
@@ -81,22 +82,18 @@ class PlayersComparison:
 
     def describe(self) -> str:
         """Return the numbers as short plain tables."""
-        lines = [
-            f"{self.n_matched} of {self.n_truth} true times matched, at most "
-            f"{1e3 * self.largest_time_offset_s:.1f} ms off"
-        ]
+        off_ms = 1e3 * self.largest_time_offset_s
+        lines = [f"{self.n_matched} of {self.n_truth} true times matched, at most {off_ms:.1f} ms off"]
         lines += [line for name, errors in self.players.items() for line in _error_lines(name, errors)]
-        lines += question_units(max((each.parts["all"].median_mm for each in self.players.values()), default=math.nan))
         lines += [jump.describe() for jump in self.jumps]
-        if self.not_compared:
-            lines.append(f"not compared: {', '.join(self.not_compared)}")
-        return "\n".join(lines)
+        lines += [f"not compared: {', '.join(self.not_compared)}"] if self.not_compared else []
+        return "\n".join([*lines, *self.questions])
 
 
 def assess_players(folder: Path, truth: Path) -> PlayersComparison:
     """Compare the run of players in a folder with a truth table, and with the players.json beside it.
 
-    Raises ResultError if the folder holds no such run or the truth is of another recording.
+    Raises ResultError if the folder holds no such run, or nothing in the truth can be compared with it.
     """
     path = folder / "joints.csv"
     if not path.is_file():
@@ -114,12 +111,13 @@ def compare_players(
     visible: NDArray[np.bool_] | None = None,
     reference_jumps: dict[str, dict[str, float]] | None = None,
 ) -> PlayersComparison:
-    """Compare players of the same names, joint by joint, frame by frame, matched as in `compare_motion`.
+    """Compare players of the same names, or else in the same places, joint by joint; times as in `compare_motion`.
 
     With a rig the paper's success measure is computed too; `visible` (true frames, true players, views, true joints)
     marks what is not occluded. Raises ResultError if no player, joint or time is common to both.
     """
     frames, rows, offset = match_times(motion.time_s, truth.time_s)
+    motion = name_by_place(motion, truth)
     players = [name for name in motion.players if name in truth.players]
     joints = [name for name in motion.joints if name in truth.joints]
     if not players or not joints:
@@ -159,6 +157,7 @@ def compare_players(
         players=errors,
         jumps=compare_jumps(motion, truth, players, reference_jumps or {}),
         not_compared=tuple(name for name in (*motion.players, *motion.joints) if name not in theirs),
+        questions=question_players(motion, truth, players, joints),
     )
 
 

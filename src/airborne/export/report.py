@@ -225,8 +225,14 @@ def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
                 f"Of the {what} errors, {share['within_1sd']:.0%} lie within one standard deviation (normal: 68%) "
                 f"and {share['within_2sd']:.0%} within two (95%)."
             )
+    lines += _doubts(errors)
     table = HtmlTable([(name, f"{rms:.2f}", f"{most:.2f}") for name, rms, most in rows], ("", "RMS", "largest"))
     return _Comparison(title, table, lines)
+
+
+def _doubts(comparison: Mapping[str, Any]) -> list[str]:
+    """Return what is asked about a reference, which makes its errors doubtful."""
+    return [f"Doubtful: {question}" for question in comparison.get("questions", ())]
 
 
 def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
@@ -242,6 +248,7 @@ def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
         f"{comparison['n_matched']} of {comparison['n_reference']} reference times matched.",
         "Without offset: less a constant offset in the segment, as two definitions of a joint have.",
         f"Joints tracked: {comparison['share_tracked']:.0%}; of these more than 100 mm off: {comparison['n_far']}.",
+        *_doubts(comparison),
     ]
     return _Comparison(title, table, lines)
 

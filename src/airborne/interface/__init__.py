@@ -182,8 +182,9 @@ def evaluate(
 
     Returns a comparison for each, by name, which describes itself (`.describe()`). With `joint_angles`, with `repeats`,
     other runs of the same trial, or `operators`, other people's clicks beside `digitised`, there is `agreement` too: of
-    the run with all of them and between the repetitions, with tables and figures in the run's folder. Raises an
-    AirborneError where a file cannot be read, or is of another recording.
+    the run with all of them and between the repetitions, with tables and figures in the run's folder. What seems
+    wrong with a reference, such as its unit, its clock or its recording, is among the comparison's `questions`. Raises
+    an AirborneError where a file cannot be read, or nothing in it can be compared.
 
     >>> evaluate("results", "truth.csv")["truth"].n_matched
     5
@@ -197,12 +198,13 @@ def evaluate(
             "nothing to compare with; give truth, digitised, joints or joint_angles, the path of a table, or repeats"
         )
     folder = folder_of(run)
-    comparisons: dict[str, Comparison | AgreementReport] = {} if is_alone else {**assess(folder, *references)}
+    compared = {} if is_alone else assess(folder, *references)
     if angles or runs or clicks:
-        comparisons["agreement"] = evaluate_agreement(
-            folder, *references, joint_angles=angles, repeats=runs, operators=clicks
+        agreement = evaluate_agreement(
+            folder, *references, joint_angles=angles, repeats=runs, operators=clicks, comparisons=compared
         )
-    return comparisons
+        return {**compared, "agreement": agreement}
+    return compared
 
 
 @explain_paths

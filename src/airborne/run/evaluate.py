@@ -53,6 +53,7 @@ from airborne.run.reference_series import body_series, players_series
 Comparison = MotionComparison | DigitisedComparison | JointComparison | PlayersComparison
 Comparisons = Mapping[str, Comparison]
 
+_SERIES_OF = {"truth": "the truth", "joints": "the joints", "digitised": "points digitised"}  # by comparison
 _LARGEST_METHODS_BYTES = 1_000_000  # a hundred comparisons; anything larger was not written here
 
 
@@ -167,13 +168,15 @@ def evaluate_agreement(
     repeats: Sequence[Path] = (),
     operators: Sequence[Path] = (),
     out: Path | None = None,
+    comparisons: Comparisons | None = None,
 ) -> AgreementReport:
     """Say how well the run in a folder agrees with references, and how well repetitions agree with one another.
 
     `repeats` are folders of other runs of the same trial; `operators` files of points that other people clicked in the
     pictures of `digitised`. Writes agreement.csv, repeatability.csv, figures and a methods paragraph into the run's
-    folder, or into `out`, where results of earlier comparisons with something else stay. Raises ResultError where
-    something is no run, cannot be read, or is of another recording.
+    folder, or into `out`, where results of earlier comparisons with something else stay. What `comparisons`, of
+    `assess`, ask about the references stands in the paragraph. Raises ResultError where something is no run, cannot be
+    read, or is a run of other videos.
     """
     if operators and digitised is None:
         raise ResultError("clicks of other people are compared with the first person's; give those as --digitised")
@@ -224,7 +227,10 @@ def evaluate_agreement(
             {name: [row for row in rows if row.name in first] for name, rows in agreements.items()},
             {name: [row for row in rows if row.name in first] for name, rows in repeatable.items()},
             versions(),
-            _read_earlier(out / run_folder.AGREEMENT_METHODS),
+            questions={
+                _SERIES_OF[name]: each.questions for name, each in (comparisons or {}).items() if name in _SERIES_OF
+            },
+            earlier=_read_earlier(out / run_folder.AGREEMENT_METHODS),
         )
         write_text(out / run_folder.AGREEMENT_METHODS, text)
     wrote = (*files, run_folder.AGREEMENT_METHODS)

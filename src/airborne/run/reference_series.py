@@ -22,6 +22,7 @@ from airborne.evaluation import (
     read_truth,
 )
 from airborne.evaluation.jump_errors import pair_jumps
+from airborne.evaluation.players_questions import name_by_place
 from airborne.evaluation.variables import (
     Variables,
     align_symmetry,
@@ -49,8 +50,9 @@ def players_series(
     own, references, repeated = players_variables(motion), SeriesByReference(), SeriesByReference()
     if truth is not None:
         true = read_players_truth(truth)
+        motion = name_by_place(motion, true)
         players = [name for name in motion.players if name in true.players]
-        series = common_series([own, players_variables(true)], "the run and its truth")
+        series = common_series([players_variables(motion), players_variables(true)], "the run and its truth")
         pairs = pair_jumps(motion, true, players)
         references["the truth"] = series + (jump_series(pairs) if pairs else [])
     if repeats:
