@@ -1,9 +1,11 @@
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import RigidTransform
 
+from airborne.body import Pose, human18
 from airborne.export.sheet import BACKGROUND_GREY, N_BUFFERED, ContactSheet, _cell
-from airborne.export.views import CELL_PX, CROP_MARGIN, crop_camera
+from airborne.export.views import CELL_PX, CROP_MARGIN, _points, crop_camera
 from airborne.tracking import Status
 from tests.support.export_scenes import BALL, BOX, RIG, SCENE_GREY, camera, frames, posed
 
@@ -63,3 +65,16 @@ def test_no_sheet_is_left_where_the_body_was_never_found(tmp_path):
     with ContactSheet(path, RIG) as sheet:
         sheet.write(frames(), None, Status.LOST)
     assert not path.exists()
+
+
+@pytest.mark.parametrize("raised_deg", [0, 90, 180])
+def test_a_person_with_raised_arms_is_whole(raised_deg):
+    person = human18(1.75, 70.0)
+    angles = np.zeros((person.n_joints, 3))
+    for side in ("left", "right"):
+        angles[person.index_of(f"upper_arm_{side}") - 1, 0] = np.radians(raised_deg)
+    body = person.with_pose(Pose(world_from_root=RigidTransform.identity(), joint_angles=angles))
+    crop = crop_camera(camera(distance_m=8.0), body)
+    px = crop.px_from_world(_points(body))
+    assert np.all((px > 0) & (px < CELL_PX - 1))
+    assert np.ptp(px, axis=0).max() > CELL_PX / 2

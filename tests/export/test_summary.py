@@ -123,3 +123,9 @@ def test_json_that_cannot_be_written_leaves_the_old_file_whole(tmp_path):
         write_json(path, {"a": object()})
     assert json.loads(path.read_text()) == {"a": 1}
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_run_of_which_less_than_half_is_tracked_says_so():
+    head = json_ready(headline(run())) | {"n_frames": 9, "n_tracked": 4, "n_uncertain": 5}
+    assert any("Only 4 of 9 frames are tracked" in warning for warning in body_warnings(head))
+    assert not any("Only" in warning for warning in body_warnings(head | {"n_tracked": 5, "n_uncertain": 4}))

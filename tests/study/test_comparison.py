@@ -181,7 +181,9 @@ def test_failed_trials_are_named_in_the_text(tmp_path):
 
 
 def test_a_folder_without_a_batch_is_one_line(tmp_path):
-    with pytest.raises(AirborneError, match=r"has no trials\.csv; .* a batch that was stopped again"):
+    with pytest.raises(
+        AirborneError, match=r"has no trials\.csv; give the folder of a batch, which `airborne batch` has finished"
+    ):
         read_study(tmp_path)
     with pytest.raises(AirborneError, match="nowhere does not exist; give the folder of a batch"):
         read_study(tmp_path / "nowhere")

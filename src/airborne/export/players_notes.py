@@ -26,7 +26,7 @@ def players_warnings(summary: Mapping[str, Any]) -> Iterator[str]:
 def notes_of_players(summary: Mapping[str, Any]) -> Iterator[str]:
     """Yield `player_notes` of all players, each with its name."""
     for name, player in summary.get("players", {}).items():
-        yield from (f"{name}: {note}" for note in player_notes(player, summary["n_frames"]))
+        yield from (f"{name}: {note}" for note in player_notes(player, summary))
 
 
 def notes_of_jumps(summary: Mapping[str, Any]) -> Iterator[str]:
@@ -35,8 +35,9 @@ def notes_of_jumps(summary: Mapping[str, Any]) -> Iterator[str]:
         yield from (f"{jump['player']}, jump {jump['jump']}: {note}" for note in jump_notes(jump))
 
 
-def player_notes(player: Mapping[str, Any], n: int) -> Iterator[str]:
-    """Yield what speaks against a player's numbers in a run of n frames."""
+def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what speaks against the numbers of a player of a run."""
+    n = summary["n_frames"]
     if player["n_lost"] == n:
         yield "found in no frame: nothing was measured"
         return
@@ -51,7 +52,7 @@ def player_notes(player: Mapping[str, Any], n: int) -> Iterator[str]:
             f"{player['n_below_two_cameras']} of {n} frames rest on fewer than two cameras, so that depth is a guess"
         )
     n_posed = player["n_tracked"] + player["n_uncertain"]
-    if not player["n_tracked"]:
+    if not player["n_tracked"] and not summary.get("self_check"):  # which says why
         yield (
             "no frame was tracked, so none of these numbers can be relied on: are the joints of [[start.player]] those "
             "of the frame of [start]? `airborne track --first-frame` draws them there"
@@ -78,9 +79,9 @@ def jump_notes(jump: Mapping[str, Any]) -> Iterator[str]:
         )
     elif jump["status"] != "whole":
         yield f"{_UNKNOWN_EVENTS[jump['status']]} not known: {_EVENT_TAKES}"
-    if not is_known(jump["hip_height_m"]):
+    if not is_known(jump["hip_height_m"]) and not is_no_fall(noise_scale):
         yield f"how high the hips rose is not known: {_PEAK_TAKES}"
-    elif jump["standing_source"] == "lengths":
+    elif is_known(jump["hip_height_m"]) and jump["standing_source"] == "lengths":
         yield (
             "standing was not seen, so its height is derived from leg lengths and the intervals are wide: film "
             f"{WINDOW_S:g} s of standing upright and still within {NEAR_S:g} s of the jump"

@@ -99,7 +99,7 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
         counts = ", ".join(f"{player[f'n_{status}']} {status}" for status in Status)
         sd_mm = player["median_sd_mm"]
         yield f"{name}: {counts}; median sd of a joint {UNKNOWN_TEXT if sd_mm is None else f'{sd_mm:.0f} mm'}"
-        yield from (f"  {note}" for note in player_notes(player, summary["n_frames"]))
+        yield from (f"  {note}" for note in player_notes(player, summary))
     if not summary["jumps"] and summary["n_frames"] > 1:
         yield "no jump was found"
     for jump in summary["jumps"]:

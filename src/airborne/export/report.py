@@ -50,8 +50,8 @@ _FIGURES = {  # titles and captions, in the order of the page
     "flight.png": (
         "Centre of mass and angular momentum",
         "Height of the centre of mass, and the angular momentum about it in world axes. In free flight the height is a "
-        "parabola and the momentum constant: how far they are from that checks the measurement, the height only where "
-        "no whole run was fitted, which takes the fall as known.",
+        "parabola and the momentum constant: how far they are from that checks the measurement where no whole run was "
+        "fitted, which takes both as known.",
     ),
     "through_mask.png": (
         "Through the mask",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -49,9 +50,33 @@ def crop_camera(camera: Camera, posed: PosedBody) -> Camera | None:
 
 @lru_cache(maxsize=2)
 def _diameter_m(model: BodyModel) -> float:
-    """Return twice the body's largest distance from its middle, joints straight."""
-    points = _points(model.with_pose(Pose(world_from_root=RigidTransform.identity())))
-    return 2 * float(np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max())
+    """Return how long a body may be: joints straight, or two limbs, as arm and leg, stretched apart."""
+    posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    points, parents = _points(posed), model.parents
+    straight = 2 * float(np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max())
+    owner, n = _segments_of_points(posed), len(parents)
+    hangs_on = np.eye(n, dtype=bool)  # a row for each segment, all that it is moved by
+    for segment in range(1, n):
+        hangs_on[segment] |= hangs_on[parents[segment]]
+    limbs = [s for s in range(1, n) if np.count_nonzero(parents == parents[s]) > 1]
+    reach = {
+        s: np.linalg.norm(posed.t[s] - posed.t[0])
+        + np.linalg.norm(points[hangs_on[owner, s]] - posed.t[s], axis=1).max(initial=0.0)
+        for s in limbs
+    }
+    apart = [
+        reach[a] + reach[b]
+        for a, b in combinations(limbs, 2)
+        if parents[a] != parents[b] and not hangs_on[a, b] and not hangs_on[b, a]
+    ]
+    return float(max([straight, *apart]))
+
+
+def _segments_of_points(posed: PosedBody) -> NDArray[np.int64]:
+    """Return which segment each of `_points` lies on: (p,)."""
+    shapes = cached_surface_arrays(posed.model)
+    corner_segment = np.repeat(shapes.polygon_segment, np.diff(shapes.start))
+    return np.concatenate([np.repeat(shapes.ellipsoid_segment, 6), corner_segment])
 
 
 def _points(posed: PosedBody) -> NDArray[np.floating]:
@@ -60,6 +85,5 @@ def _points(posed: PosedBody) -> NDArray[np.floating]:
     half = np.swapaxes(shapes.ellipsoid_axes * shapes.ellipsoid_semi_axes[:, None], 1, 2)  # rows: half axes
     ends = np.concatenate([shapes.ellipsoid_centre[:, None] + half, shapes.ellipsoid_centre[:, None] - half], axis=1)
     points = np.concatenate([ends.reshape(-1, 3), shapes.corners])
-    corner_segment = np.repeat(shapes.polygon_segment, np.diff(shapes.start))
-    segment = np.concatenate([np.repeat(shapes.ellipsoid_segment, 6), corner_segment])
+    segment = _segments_of_points(posed)
     return np.einsum("pij,pj->pi", posed.R[segment], points) + posed.t[segment]

@@ -20,7 +20,6 @@ from airborne.run.moving_mix_ups import MovingSilhouettes, look_at_silhouettes, 
 from airborne.run.opening import (
     Opened,
     dark_start_error,
-    has_fewer_seconds_by_rate,
     open_trial,
     past_the_end_error,
     read_or_calibrate,
@@ -34,7 +33,6 @@ from airborne.video import Recording, VideoFacts, inspect
 from airborne.video.outages import DARK_LEVEL, is_dark
 
 _T = TypeVar("_T")
-_UNEQUAL = 0.05  # chosen: of the first camera's duration; cameras stopped one after the other differ by less
 _DIM_LEVEL = 2 * DARK_LEVEL  # chosen: an image at 6 % of its brightness has no brighter pixel
 _NO_MIX_UP = "videos: no sign at the start that cameras' videos were exchanged"
 _UNDECIDED = "videos: what moves does not show whether any were exchanged or mirrored; tracking may show it"
@@ -84,7 +82,6 @@ def check_trial(path: Path, report: Callable[[str], None] = lambda line: None) -
     checks.mistakes += [f"{path.name}: {mistake}" for mistake in list_wrong_names(trial)]
     facts = _check_videos(checks, trial)
     checks.attempt(lambda: refuse_same_files(trial), lambda _: "videos: each camera has a file of its own")
-    _note_lengths(checks, trial, facts)
     _check_files(checks, trial, facts)
     if not checks.mistakes:
         _check_start(checks, trial, tuple(facts.values()))
@@ -114,20 +111,6 @@ def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
                     "copy it again, or track without them"
                 )
     return found
-
-
-def _note_lengths(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> None:
-    """Note a video that is shorter than the first camera's, where nobody has said that cameras began apart."""
-    first, durations = trial.camera[0].name, {name: each.duration_s for name, each in facts.items()}
-    if any(camera.offset_s for camera in trial.camera) or (first_s := durations.get(first)) is None:
-        return
-    for name, duration_s in durations.items():
-        is_fast = has_fewer_seconds_by_rate(facts[name], facts[first])  # which is noted as such
-        if duration_s is not None and first_s - duration_s > _UNEQUAL * first_s and not is_fast:
-            checks.add(
-                f"note: the video of {name} is {float(first_s - duration_s):.2f} s shorter than that of {first}: if it "
-                "began later, `airborne sync` finds by how much"
-            )
 
 
 def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> None:

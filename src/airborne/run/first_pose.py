@@ -22,6 +22,12 @@ from airborne.trial.keys import KeyTable
 
 OUT_OF_SIGHT = "the start pose lies in no camera's image; check [start], in metres, and the calibration"
 
+_AVERAGE_JOINTS = (
+    "no joint of this person was given, so joints lie where an average person of this stature has them: by how much "
+    "this one differs, some centimetres at hips, shoulders, hands and head, is not in sd_m; give start.joints_m, "
+    "clicks or detections, or let `airborne fit-body` measure the body"
+)
+
 
 def find_first_pose(trial: Trial, model: BodyModel, rig: Rig, detections: TrialDetections | None) -> FirstPose:
     """Find the first pose of a trial; `rig` holds the cameras of its videos, resected where the trial asks for it.
@@ -41,7 +47,9 @@ def find_first_pose(trial: Trial, model: BodyModel, rig: Rig, detections: TrialD
         lone = [name for name, n in zip(names, np.isfinite(px).all(axis=-1).sum(axis=-1), strict=True) if n == 1]
         return _add_lone_clicks(trial, model, rig, first, names=lone) if lone else first
     if start.joints_m is None:
-        return pose_by_hand(model, start.world_from_root, start.joint_angles_deg)
+        first = pose_by_hand(model, start.world_from_root, start.joint_angles_deg)
+        is_average = model.has_joints and trial.body.file is None
+        return replace(first, notes=(*first.notes, _AVERAGE_JOINTS)) if is_average else first
     where = start.joints_m if isinstance(start.joints_m, str) else "start.joints_m"
     return fit_to_points(model, where, *read_joint_positions(trial, start.joints_m))
 

@@ -88,8 +88,9 @@ def compare_silhouettes(moments: Sequence[Moment]) -> MovingSilhouettes:
         ]
         if (odd := _clear_minimum(left_out, as_they_are, *_OF_DOUBT)) is not None:
             doubts.append(
-                f"{what}, but those without {names[odd]} can: is its video of this recording, and was it moved or "
-                "calibrated wrongly? Correct that, or leave it out (--cameras)"
+                f"{what}, but those without {names[odd]} can: is its video of this recording, does it begin with the "
+                "others' (`airborne sync`), and was it moved or calibrated wrongly? Correct that, or leave it out "
+                "(--cameras)"
             )
     return MovingSilhouettes(as_they_are, tuple(doubts))
 

@@ -40,6 +40,7 @@ _BEYOND, _LEAST_SHARE = 0.5, 0.1
 
 _SHARES = (2, 3, 4)  # chosen: of images that are left out evenly: every second, two of three, three of four
 _OTHER_RATE = 0.005  # chosen: of the usual rate; 59.94 and 60 images a second differ by a thousandth
+_UNEQUAL = 0.05  # chosen: of the first camera's duration; cameras stopped one after the other differ by less
 _FEWEST_IMAGES = 10  # chosen: of a video whose length says something
 
 AnyRecording = TypeVar("AnyRecording", bound=Recording | LiveRecording, covariant=True)
@@ -90,6 +91,8 @@ def open_trial(trial: Trial, facts: Sequence[VideoFacts] | None = None) -> Opene
     )
     videos = recording.rig.names, cameras.facts
     recording.events.extend([*cameras.notes, *fewer_images(*videos), *other_rates(*videos)])
+    if not any(camera.offset_s for camera in trial.camera):  # else somebody has said that cameras began apart
+        recording.events.extend(shorter_videos(*videos))
     n, stop = recording.n_images, trial.track.stop
     if n is not None and stop is not None and stop > n:
         recording.events.append(f"track.stop = {stop} lies past the end: the last frame is {n - 1}")
@@ -130,6 +133,20 @@ def other_rates(names: Sequence[str], facts: Sequence[VideoFacts]) -> list[str]:
             + (", and it has as many images as they: its rate is wrong, unless it ended earlier" if has_same else "")
             + "; if it was filmed at their rate, write the video anew with that"
         )
+    return notes
+
+
+def shorter_videos(names: Sequence[str], facts: Sequence[VideoFacts]) -> list[str]:
+    """Return, as sentences, which videos are shorter than the first camera's, as where they began later."""
+    first_s, notes = facts[0].duration_s, []
+    for name, each in zip(names[1:], facts[1:], strict=True):
+        if first_s is None or each.duration_s is None or has_fewer_seconds_by_rate(each, facts[0]):
+            continue
+        if first_s - each.duration_s > _UNEQUAL * first_s:
+            notes.append(
+                f"the video of {name} is {float(first_s - each.duration_s):.2f} s shorter than that of {names[0]}: if "
+                "it began later, `airborne sync` finds by how much"
+            )
     return notes
 
 

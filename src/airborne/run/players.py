@@ -151,7 +151,10 @@ class PlayersRun:
         write_jumps(folder / JUMPS, jumps)
         said = [] if wrong or self._is_slow else motion.players  # of a wrong world or rate, which makes all uncertain
         doubts = {name: self._doubts(tracked, name) for name in said}
-        summary = {**self._summary(tracked, doubts), "jumps": [jump_row(jump) for jump in jumps]}
+        summary = {
+            **self._summary(tracked if wrong is None else motion, doubts),
+            "jumps": [jump_row(jump) for jump in jumps],
+        }
         return motion, summary if wrong is None else summary | {"self_check": [wrong.to_dict()]}
 
     def write_report(self, folder: Path, summary: dict[str, Any], motion: PlayersMotion) -> None:

@@ -76,9 +76,7 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
         found = "is a file" if folder.exists() else "does not exist"
         raise ResultError(f"{folder} {found}; give the folder of a batch")
     if not (folder / TABLE).exists():
-        raise ResultError(
-            f"{folder} has no {TABLE}; give the folder of a batch, or give a batch that was stopped again, to its end"
-        )
+        raise ResultError(f"{folder} has no {TABLE}; give the folder of a batch, which `airborne batch` has finished")
     (_, names), *lines = read_csv(folder / TABLE, _FORM, ResultError) or [(1, [""])]
     if not set(names) >= _NEEDED or len(set(names)) < len(names):
         raise ResultError(
