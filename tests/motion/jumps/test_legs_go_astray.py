@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airborne.motion.jumps.jump import are_legs_lost
 from tests.support.jumping import Jumper, motion_of, only
 
 CLEAN = Jumper()
@@ -52,3 +53,9 @@ def test_frames_of_uncertain_hips_are_counted_apart_from_those_of_uncertain_legs
     status[at, 0, motion.joints.index("hip_right")] = "uncertain"
     jump = only(replace(motion, joint_status=status))
     assert (jump.n_uncertain, jump.n_hips_uncertain) == (4, 1)
+
+
+def test_feet_that_rise_more_than_knees_bend_are_lost_in_whatever_flight():
+    assert are_legs_lost(noise_scale=1.0, tuck_m=0.7)
+    assert not are_legs_lost(noise_scale=1.0, tuck_m=0.5)
+    assert are_legs_lost(noise_scale=5.0, tuck_m=0.5)
