@@ -50,6 +50,12 @@ def test_a_shift_of_the_world_is_the_bias_and_goes_with_it():
     assert result.whole.mean_without_offset_mm > 0.1  # the segments turn under it
 
 
+def test_another_origin_of_the_world_is_asked_about_and_a_small_shift_is_not():
+    (question,) = compare_joints(run(), MODEL, paths(error_m=np.array([-1.0, 0.0, 0.0]))).questions
+    assert "less a constant shift in the world the mean would be 0 mm, not 1000 mm" in question
+    assert compare_joints(run(), MODEL, paths(error_m=np.array([-0.05, 0.0, 0.0]))).questions == ()
+
+
 def test_paths_of_another_recording_are_asked_about():
     question = "are they of this recording?"
     elsewhere = np.random.default_rng(3).uniform(-2, 2, (len(TIMES), len(MARKS), 3))

@@ -87,6 +87,11 @@ class JointComparison:
             )
         if min(self.whole.mean_without_offset_mm, self.whole.mean_without_bias_mm) > _ELSEWHERE_MM:
             return ("the paths are nowhere near these joints: are they of this recording?",)
+        if self.whole.mean_mm > _ELSEWHERE_MM > self.whole.mean_without_bias_mm:
+            return (
+                f"less a constant shift in the world the mean would be {self.whole.mean_without_bias_mm:.0f} mm, not "
+                f"{self.whole.mean_mm:.0f} mm: is the reference's origin that of the run's world?",
+            )
         return ()
 
     def describe(self) -> str:

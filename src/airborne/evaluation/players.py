@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError, count
+from airborne.evaluation.columns import align_columns
 from airborne.evaluation.compare import nan_to_none, or_dash
 from airborne.evaluation.jump_errors import JumpErrors, compare_jumps
 from airborne.evaluation.players_questions import name_by_place, question_players
@@ -276,15 +277,15 @@ def _losses(pair: _Pair, columns: list[int]) -> list[tuple[int, bool]]:
 def _error_lines(player: str, errors: PlayerErrors) -> list[str]:
     lines = [
         f"{player}: {errors.n_tracked} tracked, {errors.n_uncertain} uncertain, {errors.n_lost} lost",
-        f"  {'error [mm]':<14}{'mean':>8}{'median':>8}{'max':>8}{'<=100':>8}{'<=50':>8}{'AUC200':>8}{'jitter':>8}"
-        f"{'in 95%':>8}{'cover':>8}",
     ]
+    rows = [("  error [mm]", "mean", "median", "max", "<=100", "<=50", "AUC200", "jitter", "in 95%", "cover")]
     for name, e in errors.parts.items():
         cover = errors.cover.rate.get(name, math.nan) if errors.cover else math.nan
         numbers = [or_dash(number, ".1f") for number in (e.mean_mm, e.median_mm, e.largest_mm)]
         numbers += [or_dash(share, ".1%") for share in (e.within_100mm, e.within_50mm, e.auc_200mm)]
         numbers += [or_dash(e.jitter_mm, ".1f"), or_dash(e.within_95, ".1%"), or_dash(cover, ".1%")]
-        lines.append(f"  {name:<14}" + "".join(f"{number:>8}" for number in numbers))
+        rows.append((f"  {name}", *numbers))
+    lines += align_columns(rows, (16, *[8] * 9))
     swaps = ", ".join(f"{name} {rate:.1%}" for name, rate in errors.swap_rate.items())
     lines.append(
         f"  limbs correct (PCP 0.5) {or_dash(errors.pcp, '.1%')}; left and right swapped: {swaps or 'not judged'}"

@@ -14,7 +14,7 @@ from airborne.types import Array
 NEAR_MM = 100.0  # chosen: a reference that is further away, whatever is changed, is not explained by the change
 _SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
-_FARTHEST_SHIFT = 3  # chosen: periods by which the clocks are shifted relative to each other
+_FARTHEST_SHIFT = 10  # chosen: periods by which the clocks are shifted relative to each other
 _MOST_FRAMES = 0.9  # chosen: shifts that leave fewer of the frames are ignored
 _FEW_TIMES = 3  # chosen: matches at least that speak for milliseconds, and more than twice those in seconds
 

@@ -32,6 +32,9 @@ _TABLE_FORMATS = ("csv", "parquet")
 _UNIFORM_FORMATS = ("c3d", "bvh")  # uniform sampling: hold a rate and no times
 _LARGEST_JITTER = 0.05  # of a frame: how far such a file may shift one in time
 _ROWS_AT_A_TIME = 10  # poses in memory at once
+# how unknown points show in each format
+_UNKNOWN_IN = {"trc": "gaps in .trc", "c3d": "the largest residual in .c3d"}
+_UNMARKED_IN = {"mot": ".mot", "bvh": ".bvh", "gltf": ".glb"}
 _NO_PARQUET = "Parquet needs pyarrow, which is not installed: pip install pyarrow"
 
 
@@ -91,17 +94,23 @@ def export_run(
 
 def _gap_notes(takes: Sequence[Take], wanted: Sequence[str]) -> Iterator[str]:
     """Say for each body in how many frames it has no pose, and how many of its points are unknown."""
-    has_parts = bool({"mot", "bvh"} & set(wanted))
+    in_parts = [f".{each}" for each in ("mot", "bvh") if each in wanted]
+    shown = [how for each, how in _UNKNOWN_IN.items() if each in wanted]
+    if unmarked := [extension for each, extension in _UNMARKED_IN.items() if each in wanted]:
+        shown.append(f"unmarked in {', '.join(unmarked)}")
     for take in takes:
         n, n_parts = int(np.sum(~take.has_pose)), len(take.stretches())
         who = f"{take.name}: " if take.name else ""
-        parts = f"; .mot and .bvh are in {n_parts} parts, one a stretch without a gap" * (has_parts and n_parts > 1)
+        parts = ""
+        if in_parts and n_parts > 1:
+            verb = "are" if len(in_parts) > 1 else "is"
+            parts = f"; {' and '.join(in_parts)} {verb} in {n_parts} parts, one a stretch without a gap"
         if n:
             yield f"{who}{n} of {len(take)} frames have no pose and stay gaps{parts}"
         n_unknown = int(np.sum(np.isinf(take.sd)))
-        if n_unknown:
+        if n_unknown and shown:
             share = f"{n_unknown} of {take.sd.size} points are unknown, what stands for them is a guess"
-            yield f"{who}{share}: gaps in .trc, the largest residual in .c3d, unmarked in .mot, .bvh and .glb"
+            yield f"{who}{share}: {', '.join(shown)}"
 
 
 def _read(folder: Path, has_tables: bool, progress: Progress) -> _RunData:
