@@ -275,16 +275,14 @@ def _losses(pair: _Pair, columns: list[int]) -> list[tuple[int, bool]]:
 
 
 def _error_lines(player: str, errors: PlayerErrors) -> list[str]:
-    lines = [
-        f"{player}: {errors.n_tracked} tracked, {errors.n_uncertain} uncertain, {errors.n_lost} lost",
-    ]
-    rows = [("  error [mm]", "mean", "median", "max", "<=100", "<=50", "AUC200", "jitter", "in 95%", "cover")]
+    lines = [f"{player}: {errors.n_tracked} tracked, {errors.n_uncertain} uncertain, {errors.n_lost} lost"]
+    rows = [["  error [mm]", "mean", "median", "max", "<=100", "<=50", "AUC200", "jitter", "in 95%", "cover"]]
     for name, e in errors.parts.items():
         cover = errors.cover.rate.get(name, math.nan) if errors.cover else math.nan
         numbers = [or_dash(number, ".1f") for number in (e.mean_mm, e.median_mm, e.largest_mm)]
         numbers += [or_dash(share, ".1%") for share in (e.within_100mm, e.within_50mm, e.auc_200mm)]
         numbers += [or_dash(e.jitter_mm, ".1f"), or_dash(e.within_95, ".1%"), or_dash(cover, ".1%")]
-        rows.append((f"  {name}", *numbers))
+        rows.append([f"  {name}", *numbers])
     lines += align_columns(rows, (16, *[8] * 9))
     swaps = ", ".join(f"{name} {rate:.1%}" for name, rate in errors.swap_rate.items())
     lines.append(

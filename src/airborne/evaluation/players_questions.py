@@ -44,8 +44,10 @@ def question_players(
     """Ask in one line what is wrong with a truth, in unit, axes, sides, clock or recording; () where it is near."""
     own, true = _points(motion, players, joints), _points(truth, players, joints)
     names = [f"{player}_{joint}" for player in players for joint in joints]
-    paths = (Paths(each.time_s, points.reshape(len(each), -1, 3)) for each, points in ((motion, own), (truth, true)))
-    if mix_up := question_mix_up(*paths, names):
+    of_run, of_truth = (
+        Paths(each.time_s, points.reshape(len(each), -1, 3)) for each, points in ((motion, own), (truth, true))
+    )
+    if mix_up := question_mix_up(of_run, of_truth, names):
         return (mix_up,)
 
     def mean_at(shift_s: float) -> tuple[float, int]:
