@@ -26,7 +26,7 @@ def test_a_body_that_is_a_little_too_large_is_not_called_right(tmp_path, capsys)
 
 
 @pytest.mark.parametrize(("n_tracked", "said"), [(0, "0 of 9 frames are tracked"), (1, "1 of 9 frames is tracked")])
-def test_of_a_run_that_is_hardly_tracked_nothing_is_called_right(n_tracked, said):
+def test_of_a_run_that_is_mostly_untracked_nothing_is_called_right(n_tracked, said):
     finding = {"is_alarm": False, "sentence": "the body looks as large as it is"}
     summary = {"n_frames": 9, "n_tracked": n_tracked, "n_lost": 1, "self_check": [finding]}
     verdict = _describe_self_check(summary)

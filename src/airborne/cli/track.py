@@ -175,9 +175,9 @@ def _describe_self_check(summary: dict) -> str | None:
         return None
     if any(each["is_alarm"] for each in findings):
         return "self-check: something is wrong, see the notes"
-    from airborne.export.summary import is_hardly_tracked
+    from airborne.export.summary import is_mostly_untracked
 
-    if is_hardly_tracked(summary):
+    if is_mostly_untracked(summary):
         tracked = count_of(summary["n_tracked"], n, "frame")
         return f"self-check of sizes, cameras and times: {tracked} tracked, too few to say that nothing is wrong"
     if not findings:
@@ -220,7 +220,7 @@ def _describe(summary: dict, output: Path) -> str:
         lines.append(f"the body was found in no frame: {look_and}correct [start]")
     else:
         from airborne.export import describe_doubts
-        from airborne.export.summary import is_hardly_tracked
+        from airborne.export.summary import is_mostly_untracked
 
         if summary["doubts"]:
             lines.append(f"uncertain: {describe_doubts(summary)}")
@@ -230,7 +230,7 @@ def _describe(summary: dict, output: Path) -> str:
         elif not summary["n_tracked"]:
             lines.append("no frame was tracked, so none of these numbers can be relied on")
         else:
-            if is_hardly_tracked(summary):
+            if is_mostly_untracked(summary):
                 lines.append("what is said of the whole run, as its turns, rests on uncertain frames")
             position, rotation = summary["median_position_sd_mm"], summary["median_rotation_sd_deg"]
             lines.append(

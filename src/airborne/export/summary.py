@@ -80,7 +80,7 @@ def headline(motion: Motion) -> dict[str, Any]:
     }
 
 
-def is_hardly_tracked(head: Mapping[str, Any]) -> bool:
+def is_mostly_untracked(head: Mapping[str, Any]) -> bool:
     """Whether less than half of a run's frames are tracked, so that nothing can be said of it as a whole."""
     return bool(2 * head["n_tracked"] < head["n_frames"])
 
@@ -94,7 +94,7 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
         yield f"{count_of(head['n_lost'], n, 'frame')} lost; they hold no numbers."
     if n > 1 and n_posed and not head["n_tracked"]:
         yield "No frame was tracked: none of these numbers can be relied on."
-    elif is_hardly_tracked(head):
+    elif is_mostly_untracked(head):
         yield (
             f"Only {count_of(head['n_tracked'], n, 'frame')} tracked: turns, ranges and whatever else is said of the "
             "whole run rest on uncertain frames."
