@@ -129,7 +129,7 @@ def test_a_slow_tracker_drops_images_and_falls_behind_by_no_more_than_its_own_ti
         assert n_dropped > 60 / 2
         assert 4 <= n_used <= 60 / RATE / step_s + 3
     assert max(delays_s) < 2 * _LONGEST_WAIT_S
-    assert np.median(delays_s) < 2 / RATE
+    assert np.median(delays_s) < step_s
 
 
 def test_a_camera_that_goes_quiet_is_waited_for_once_and_then_missed(tmp_path):
