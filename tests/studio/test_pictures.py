@@ -1,5 +1,8 @@
 """Pictures are kept within a number of bytes, whatever is looked at, and what is damaged is no picture."""
 
+import os
+import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import count
 from time import monotonic, sleep
@@ -9,7 +12,7 @@ import numpy as np
 import pytest
 
 from airborne.errors import VideoError
-from airborne.studio import image_lists
+from airborne.studio import image_lists, prefetch
 from airborne.studio.image_lists import read_or_list
 from airborne.studio.jpeg_store import JpegStore, Key
 from airborne.studio.pictures import Pictures
@@ -83,8 +86,28 @@ def test_a_key_frame_comes_while_another_image_is_decoded_from_it(tmp_path):
         assert [each.done() for each in jpegs] == [True, True] and all(each.result() for each in jpegs)
 
 
+@pytest.fixture(autouse=True)
+def _gives_way_to_nobody(monkeypatch):
+    """Beside busy workers, threads of the least priority may stand still for minutes."""
+    monkeypatch.setattr(prefetch, "_LEAST_PRIORITY", 0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere threads have no priority of their own")
+def test_what_is_made_beforehand_gives_way_to_everything_else(monkeypatch, tmp_path):
+    monkeypatch.undo()
+    seen = []
+    monkeypatch.setattr(
+        prefetch.Prefetch,
+        "_wait",
+        lambda self: seen.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id())) or False,
+    )
+    Pictures(tmp_path).prefetch.start()
+    wait_until(lambda: seen)
+    assert set(seen) == {19}
+
+
 def wait_until(is_so):
-    end = monotonic() + 180  # threads of the lowest priority, beside busy workers
+    end = monotonic() + 60
     while not is_so() and monotonic() < end:
         sleep(0.01)
     assert is_so()

@@ -160,21 +160,21 @@ def test_a_camera_that_goes_away_comes_back_at_the_times_of_its_arrival(tmp_path
         clock = next(each for each in threading.enumerate() if isinstance(each, Sender) and each.path.name == "cam2")
         seen = {}
         for frames in recording:
-            if frames.index >= 50 and again[0].ident is None:
+            if frames.index >= 70 and again[0].ident is None:
                 again[0].start()
-            if frames.index >= 140 and again[1].ident is None:
+            if frames.index >= 160 and again[1].ident is None:
                 again[1].start()
             seen[frames.index] = levels_of(frames)
         events = recording.events
     shown = [(index, numbers[1]) for index, numbers in seen.items() if numbers[1] is not None]
-    assert max(number for index, number in shown if index <= 50) == 40
-    for sender, first, last in ((again[0], 51, 139), (again[1], 140, 225)):
+    assert max(number for index, number in shown if index <= 70) == 40
+    for sender, first, last in ((again[0], 71, 159), (again[1], 160, 225)):
         sender.join(5)
         begun = (sender.begun_s - clock.begun_s) * RATE
         late = [(index - number - begun + 28) % 56 - 28 for index, number in shown if first <= index <= last]
         assert len(late) > 10  # busy machines drop frames
         assert np.ptp(late) <= 1
-        assert abs(np.mean(late)) < 5  # a busy machine sends late; going on where it left off would be off by 10
+        assert abs(np.mean(late)) < 12  # a busy machine sends late; going on where it left off would be off by 20
     assert [event for event in events if "came back 2×" in event and event.startswith("cam2")]
 
 
