@@ -157,6 +157,12 @@ def test_a_player_by_another_name_is_the_one_who_stands_there():
     assert [each.parts["all"].mean_mm for each in errors.values()] == [0.0, 0.0]
 
 
+def test_a_player_of_whom_nothing_is_known_stands_by_nobody():
+    points = np.concatenate([STILL.points, np.full_like(STILL.points, np.nan)], axis=1)
+    found = replace(players_motion(STILL.time_s, points), players=("player1", "player2"))
+    assert list(compare_players(found, STILL).players) == ["one"]
+
+
 def test_a_truth_that_is_near_is_not_asked_about():
     assert compare_players(replace(STILL, points=STILL.points + 0.05), STILL).questions == ()
     assert compare_players(TRUTH, TRUTH).questions == ()

@@ -21,6 +21,16 @@ from airborne.types import Array
 _LOCKED = 1e-8  # cosine of the middle angle below which the other two are one angle
 
 
+def chain_of(model: BodyModel, index: int) -> list[int]:
+    """Return a segment's ancestors, the root first, and itself."""
+    return [index] if index == 0 else [*chain_of(model, int(model.parents[index])), index]
+
+
+def subtree(model: BodyModel, index: int) -> list[int]:
+    """Return a segment and its descendants."""
+    return [i for i in range(len(model.segments)) if index in chain_of(model, i)]
+
+
 def move_pose(pose: Pose, delta: Array) -> Pose:
     """Apply a change `delta` (6 + 3 joints,) to a pose.
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.chain import clamp_to_limits
+from airborne.body.chain import chain_of, clamp_to_limits, subtree
 from airborne.body.landmark_fit import (
     COARSE_GAIN,
     LandmarkProblem,
@@ -172,12 +172,12 @@ def _fit_limb(problem: LandmarkProblem, state: PoseState, top: int) -> PoseState
     Of a grid over its first two joints, minimise from the best point of each axial rotation.
     """
     model = problem.model
-    limb = _subtree(model, top)
+    limb = subtree(model, top)
     is_own = np.isin(problem.model.landmark_segments, limb)
     if not (problem.is_given & is_own).any():
         return state
     alone = replace(problem, targets=np.where(is_own[:, None], problem.targets, np.nan))
-    girdle = [index for index in _chain(model, top)[:-1] if sum(index in chain for chain in _core_chains(model)) == 1]
+    girdle = [index for index in chain_of(model, top)[:-1] if sum(index in chain for chain in _core_chains(model)) == 1]
     joints = np.array(limb[:2]) - 1
     first, last = (model.segments[limb[k]].limits for k in (0, len(joints) - 1))
     half = np.minimum(np.stack([first.half_rad, last.half_rad]), np.pi)
@@ -232,17 +232,7 @@ def _carriers(model: BodyModel, landmark: int) -> list[int]:
 def _core_chains(model: BodyModel) -> list[set[int]]:
     """Return the segments above each hip's and shoulder's joint, the root among them."""
     owners = {landmark.name: model.index_of(landmark.segment) for landmark in model.landmarks}
-    return [{*_chain(model, owners[name])} - {owners[name]} for name in CORE]
-
-
-def _chain(model: BodyModel, index: int) -> list[int]:
-    """Return a segment's ancestors, the root first, and itself."""
-    return [index] if index == 0 else [*_chain(model, int(model.parents[index])), index]
-
-
-def _subtree(model: BodyModel, index: int) -> list[int]:
-    """Return a segment and its descendants."""
-    return [i for i in range(len(model.segments)) if index in _chain(model, i)]
+    return [{*chain_of(model, owners[name])} - {owners[name]} for name in CORE]
 
 
 def _variables(model: BodyModel, segments: Iterable[int], *, root: bool = True) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from airborne.errors import ResultError
 from airborne.evaluation.columns import align_columns
 from airborne.evaluation.mix_ups import Paths, question_mix_up
-from airborne.evaluation.times import best_time_shift, match_times, span
+from airborne.evaluation.times import CLEARLY_BETTER, best_time_shift, match_times, question_shift, span
 from airborne.evaluation.truth import Truth
 from airborne.geometry.rotations import angles_from_matrix, geodesic, is_near_singular, wrap
 from airborne.motion import Motion
@@ -25,7 +25,6 @@ _ANOTHER = "is this the reference of this recording, in its world"
 _TRANSPOSED = "do r00..r22 turn the body's axes into the world's, row by row, and not the other way, transposed"
 _TRANSPOSED_NEARER = 0.25  # chosen: share of the angle that transposed rotations leave at most
 _OTHER_WAY = 10.0  # times nearer once turned to what looks the same: no noise does that
-_CLEARLY_BETTER = 0.5  # chosen: of the unshifted distance; a constant error along the motion looks like a shift
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +99,8 @@ class MotionComparison:
                 question = _TRANSPOSED if name == "rotation" and self.is_transposed else _ANOTHER
                 asked.append(f"hardly any {name} lies within 2 sd: {question}?")
         if self.better_shift_s:
-            asked.append(
-                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, the RMS in space would be "
-                f"{self.better_rms_3d_mm:.2f} mm: do both clocks start at the same frame?"
-            )
+            then = f"the RMS in space would be {self.better_rms_3d_mm:.2f} mm"
+            asked.append(question_shift(self.better_shift_s, "reference", then))
         return tuple(asked)
 
     def describe(self) -> str:
@@ -182,7 +179,7 @@ def compare_motion(motion: Motion, truth: Truth, symmetries: Sequence[Array]) ->
         error = (motion.position[frames] - truth.position[rows])[motion.has_pose[frames]]
         return float(1e3 * _rms(np.linalg.norm(error, axis=-1))) if len(error) else math.nan, len(error)
 
-    shift_s, shifted_mm = best_time_shift(truth.time_s, position_errors.rms_3d_mm, rms_at, _CLEARLY_BETTER)
+    shift_s, shifted_mm = best_time_shift(truth.time_s, position_errors.rms_3d_mm, rms_at, CLEARLY_BETTER)
     return MotionComparison(
         n_frames=len(motion),
         n_truth=len(truth.time_s),

@@ -19,7 +19,7 @@ from airborne.evaluation.compare import (
 from airborne.evaluation.coverage import Coverage, coverage_of
 from airborne.evaluation.joint_files import JointPaths, landmark_of
 from airborne.evaluation.mix_ups import Paths, question_mix_up
-from airborne.evaluation.times import best_time_shift, match_times, span
+from airborne.evaluation.times import ELSEWHERE_MM, best_time_shift, match_times, question_shift, span
 from airborne.motion import JointStatus, Motion, joint_statuses
 from airborne.motion.joints import landmarks_with_frame_sds
 from airborne.tracking import Status
@@ -27,9 +27,6 @@ from airborne.types import Array, Triple
 
 _CLEARLY_BETTER = 0.98  # of the unshifted distance
 _FAR_M = 0.1  # a joint that far off is misplaced
-# [mm] chosen: mean distance of paths of something else, without constant offsets or a shift of the world; no tracked
-# person errs by a third of it
-_ELSEWHERE_MM = 300.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,13 +78,11 @@ class JointComparison:
         if self.mix_up:
             return (self.mix_up,)
         if self.better_shift_s:
-            return (
-                f"with {1e3 * self.better_shift_s:+.1f} ms added to the reference's times, {'no offset'!r} would be "
-                f"{self.better_mean_without_offset_mm:.1f} mm: do both clocks start at the same frame?",
-            )
-        if min(self.whole.mean_without_offset_mm, self.whole.mean_without_bias_mm) > _ELSEWHERE_MM:
+            then = f"'no offset' would be {self.better_mean_without_offset_mm:.1f} mm"
+            return (question_shift(self.better_shift_s, "reference", then),)
+        if min(self.whole.mean_without_offset_mm, self.whole.mean_without_bias_mm) > ELSEWHERE_MM:
             return ("the paths are nowhere near these joints: are they of this recording?",)
-        if self.whole.mean_mm > _ELSEWHERE_MM > self.whole.mean_without_bias_mm:
+        if self.whole.mean_mm > ELSEWHERE_MM > self.whole.mean_without_bias_mm:
             return (
                 f"less a constant shift in the world the mean would be {self.whole.mean_without_bias_mm:.0f} mm, not "
                 f"{self.whole.mean_mm:.0f} mm: is the reference's origin that of the run's world?",

@@ -9,13 +9,12 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from airborne.evaluation.mix_ups import Paths, question_mix_up
-from airborne.evaluation.times import best_time_shift, match_times
+from airborne.evaluation.times import CLEARLY_BETTER, ELSEWHERE_MM, best_time_shift, match_times, question_shift
 from airborne.motion.players import PlayersMotion
 from airborne.types import Array
 
-_CLEARLY_BETTER = 0.5  # chosen, as for bodies: of the unshifted distance
+_NOBODY_M = 1e6  # to somebody of whom nothing is known: further than any court is long
 _SAME_PLAYER_M = 0.5  # chosen: players at a net stand further apart than that, and are followed to a tenth of it
-_ELSEWHERE_MM = 300.0  # chosen, as for bodies: mean distance of somebody else's joints
 
 
 def name_by_place(motion: PlayersMotion, truth: PlayersMotion) -> PlayersMotion:
@@ -32,7 +31,7 @@ def name_by_place(motion: PlayersMotion, truth: PlayersMotion) -> PlayersMotion:
         [[_median_m(own[:, k] - true[:, j]) for j in range(true.shape[1])] for k in range(own.shape[1])]
     )
     names = list(motion.players)
-    for k, j in zip(*linear_sum_assignment(np.nan_to_num(distance_m, nan=np.inf, posinf=1e6)), strict=True):
+    for k, j in zip(*linear_sum_assignment(np.nan_to_num(distance_m, nan=_NOBODY_M)), strict=True):
         if distance_m[k, j] < _SAME_PLAYER_M:
             names[k] = truth.players[j]
     return replace(motion, players=tuple(names))
@@ -57,14 +56,12 @@ def question_players(
         return 1e3 * float(known.mean()) if len(known) else np.nan, len(known)
 
     mean_mm, _ = mean_at(0.0)
-    shift_s, shifted_mm = best_time_shift(truth.time_s, mean_mm, mean_at, _CLEARLY_BETTER)
+    shift_s, shifted_mm = best_time_shift(truth.time_s, mean_mm, mean_at, CLEARLY_BETTER)
     if shift_s:
-        return (
-            f"with {1e3 * shift_s:+.1f} ms added to the truth's times, the mean distance would be {shifted_mm:.1f} mm, "
-            f"not {mean_mm:.1f} mm: do both clocks start at the same frame?",
-        )
+        then = f"the mean distance would be {shifted_mm:.1f} mm, not {mean_mm:.1f} mm"
+        return (question_shift(shift_s, "truth", then),)
     elsewhere = "the truth is nowhere near these players: is it of this recording, in its world?"
-    return (elsewhere,) if mean_mm > _ELSEWHERE_MM else ()
+    return (elsewhere,) if mean_mm > ELSEWHERE_MM else ()
 
 
 def _points(motion: PlayersMotion, players: Sequence[str], joints: Sequence[str]) -> Array:

@@ -12,6 +12,9 @@ from airborne.errors import ResultError
 from airborne.types import Array
 
 NEAR_MM = 100.0  # chosen: a reference that is further away, whatever is changed, is not explained by the change
+ELSEWHERE_MM = 300.0  # chosen: mean distance of the paths of something else; no tracked person errs by a third of it
+# chosen: share of the distance that a shift of the clock leaves; a constant error along the motion looks like one
+CLEARLY_BETTER = 0.5
 _SAME_TIME_S = 1e-6  # where neither table has two times, so that no period is known
 _SAME_SHARE = 0.1  # of the shorter period: times further apart do not match
 _FARTHEST_SHIFT = 10  # chosen: periods by which the clocks are shifted relative to each other
@@ -36,6 +39,12 @@ def best_time_shift(
         if is_near and n >= _MOST_FRAMES * shifted[0][1]:
             best = step * period, error_mm
     return best
+
+
+def question_shift(shift_s: float, reference: str, then: str) -> str:
+    """Ask in one line whether the clocks are shifted; `then` says what would be with a shift [s]."""
+    added = f"with {1e3 * shift_s:+.1f} ms added to the {reference}'s times"
+    return f"{added}, {then}: do both clocks start at the same frame?"
 
 
 def match_times(time_s: Array, true_time_s: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:

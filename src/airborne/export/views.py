@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from airborne.body import BodyModel, Pose, PosedBody, surface_arrays
+from airborne.body.chain import subtree
 from airborne.cameras import Camera
 from airborne.types import Image
 from airborne.video import View
@@ -54,20 +55,17 @@ def _diameter_m(model: BodyModel) -> float:
     posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
     points, parents = _points(posed), model.parents
     straight = 2 * float(np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max())
-    owner, n = _segments_of_points(posed), len(parents)
-    hangs_on = np.eye(n, dtype=bool)  # a row for each segment, all that it is moved by
-    for segment in range(1, n):
-        hangs_on[segment] |= hangs_on[parents[segment]]
-    limbs = [s for s in range(1, n) if np.count_nonzero(parents == parents[s]) > 1]
+    owner = _segments_of_points(posed)
+    limbs = {s: subtree(model, s) for s in range(1, len(parents)) if np.count_nonzero(parents == parents[s]) > 1}
     reach = {
         s: np.linalg.norm(posed.t[s] - posed.t[0])
-        + np.linalg.norm(points[hangs_on[owner, s]] - posed.t[s], axis=1).max(initial=0.0)
-        for s in limbs
+        + np.linalg.norm(points[np.isin(owner, limb)] - posed.t[s], axis=1).max(initial=0.0)
+        for s, limb in limbs.items()
     }
     apart = [
         reach[a] + reach[b]
         for a, b in combinations(limbs, 2)
-        if parents[a] != parents[b] and not hangs_on[a, b] and not hangs_on[b, a]
+        if parents[a] != parents[b] and a not in limbs[b] and b not in limbs[a]
     ]
     return float(max([straight, *apart]))
 

@@ -11,7 +11,7 @@ from airborne.trial.file import Trial
 from airborne.types import Progress
 from airborne.video import Frames, Recording, VideoFacts, open_recording
 
-_MOST_IMAGES = 1500  # of each camera that are looked at
+_MOST_IMAGES = 1500  # chosen: of each camera that are looked at, half a minute at 50 a second
 
 
 def look_through(trial: Trial, progress: Progress | None) -> tuple[Recording, tuple[VideoFacts, ...], list[Frames]]:

@@ -35,8 +35,7 @@ _NOISY = 4.0
 # camera moved, late or at a wrong frame rate, where it is at most 0.05; block_jump then has 0.05, with a camera moved
 # half-way 0.67
 _MOST_TUCK_M = 0.3
-# and in any: of legs of 0.42 m thighs and shanks, knees bent to the end of their range, 150 degrees, are 0.62 m shorter
-_FOLDED_LEGS_M = 0.62
+_FOLDED_LEGS_M = 0.62  # and in any, by anatomy: thighs and shanks of 0.42 m, bent by 150 degrees, a knee's whole range
 
 
 def is_no_fall(noise_scale: float) -> bool:
