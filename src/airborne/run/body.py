@@ -225,6 +225,8 @@ class BodyRun:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))
             timings_s["whole_run"] = time.monotonic() - begun_s - timings_s["self_check"]
         motion = checked.motion if fitted is None else fitted.motion
+        if checked.doubtful_joints is not None:  # the fit takes what the images show of them
+            motion = replace(motion, uncertain_joints=motion.uncertain_joints | checked.doubtful_joints)
         revise_motion(folder / self.table, motion)
         if checked.found is not None:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.cameras import Rig
@@ -21,6 +22,7 @@ from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong
 from airborne.tracking.self_check.kept_frames import KeptFrames
 from airborne.tracking.self_check.nuisances import MEASURED_SD, ONE_CAMERA_SD, PRESET_SD
 from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.reach import FarReach, doubtful_joints, find_far_reach
 from airborne.tracking.self_check.roughness import PathFinding, find_wrong_path, measure_roughness
 from airborne.types import Array
 
@@ -46,8 +48,9 @@ class CheckedRun:
     motion: Motion  # with lasting errors and those of a rough path, doubtful frames uncertain
     found: SelfCheck | None  # None: too little to say anything
     doubts: tuple[str, ...]  # sentences
-    wrong: Sequence[WrongFall | PathFinding | WrongSize] = ()  # what no camera or clock explains
+    wrong: Sequence[WrongFall | PathFinding | WrongSize | FarReach] = ()  # what no camera or clock explains
     is_start_wrong: bool = False  # by its own landmarks
+    doubtful_joints: NDArray[np.bool_] | None = None  # (joints,) of limbs for which the body is too small
 
     @property
     def findings(self) -> list[dict[str, Any]]:
@@ -84,7 +87,7 @@ def check_run(
     run = gather_equations(model, rig, path, frames, body_sd=body_sd)
     found = None if run is None else self_check(run, model, rig, path)
     status, doubted, sentences = motion.status.astype(object), motion.doubts.astype(object), []
-    wrong: list[WrongFall | PathFinding | WrongSize] = []
+    wrong: list[WrongFall | PathFinding | WrongSize | FarReach] = []
     reasons = doubts(model, path, frames, begun.index, found)
     is_start_wrong = first is not None and bool(first.wrong_size or first.exchange)
     if first is not None and is_start_wrong:
@@ -92,6 +95,8 @@ def check_run(
         reasons[first.exchange or "the body is not as large as the landmarks of its start say"] = np.ones(
             len(rows), bool
         )
+    far = None if run is None or not model.has_joints else find_far_reach(model, run.reach)
+    wrong += [] if far is None else [far]
     if not model.has_joints:
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
         of_flight = find_wrong_flight(*flight)
@@ -126,7 +131,8 @@ def check_run(
         lasting = excess if lasting is None else lasting + excess
     checked = replace(motion, status=status.astype(np.str_), doubts=doubted.astype(np.str_))
     checked = replace(checked, lasting=lasting, by_frame=None)  # what is beside the table may be of an end before
-    return CheckedRun(checked, found, tuple(sentences), wrong, is_start_wrong)
+    doubtful = None if far is None else doubtful_joints(model, far)
+    return CheckedRun(checked, found, tuple(sentences), wrong, is_start_wrong, doubtful)
 
 
 def _excess(covariance: Array, rough: Array) -> Array:

@@ -29,6 +29,7 @@ from airborne.tracking.self_check.nuisances import (
     twists,
 )
 from airborne.tracking.self_check.path import TrackedPath
+from airborne.tracking.self_check.reach import reach_beyond
 from airborne.tracking.self_check.registration import Silhouette, draw_silhouette, foreground, outline_of, register
 from airborne.tracking.self_check.solution import Evidence, NuisanceSolution, PoseErrors, pose_errors, solve
 from airborne.types import Array, Image
@@ -56,6 +57,7 @@ class RunEquations:
     solution: NuisanceSolution
     errors: PoseErrors
     prior: Array  # (k, k) what is usual
+    reach: Array  # (m, c, segments) [m] see `reach_beyond`; NaN where nothing is seen, and of bodies without joints
 
     @property
     def says_causes(self) -> bool:
@@ -171,7 +173,7 @@ def gather_equations(
         return None
     chosen = np.unique(np.linspace(0, len(seen) - 1, _MOST_MOMENTS).round().astype(int))
     rows, moments = [seen[i][0] for i in chosen], [seen[i][1] for i in chosen]
-    evidence = _gather(RenderModel.of(model), rig, path, rows, moments=moments, kept=kept)
+    evidence, reach = _gather(RenderModel.of(model), rig, path, rows, moments=moments, kept=kept)
     is_drawn = np.asarray(evidence.edge.any(axis=(1, 2, 3)))
     if not is_drawn.any():
         return None
@@ -184,7 +186,7 @@ def gather_equations(
     errors = pose_errors(evidence, weights)
     if not model.has_joints:  # a person's centre of mass moves in the root; `find_wrong_fall` measures its fall
         solution = _with_fall(solution, errors, rig, path, rows=rows)
-    return RunEquations(rows, evidence, solution, errors, prior)
+    return RunEquations(rows, evidence, solution, errors, prior, reach[is_drawn])
 
 
 def _gather(
@@ -195,8 +197,8 @@ def _gather(
     *,
     moments: Sequence[Frames],
     kept: Sequence[Frames],
-) -> Evidence:
-    """Register every view of the moments."""
+) -> tuple[Evidence, Array]:
+    """Register every view of the moments; return how far a person reaches there too, as `RunEquations` has it."""
     n, c, k = len(moments), len(rig), n_parameters(rig)
     evidence = Evidence(
         offset=np.zeros((n, c, 4)),
@@ -206,8 +208,9 @@ def _gather(
         edge=np.zeros((n, c, 6, 6)),
         edge_by_parameter=np.zeros((n, c, 6, k)),
     )
-    empty, in_light = EmptyScenes(kept, render_model, path), not render_model.model.has_joints
-    registered = list[tuple[int, int, Future[Array | None], Array, Array]]()
+    reach = np.full((n, c, len(render_model.model.segments)), np.nan)
+    empty = EmptyScenes(kept, render_model, path)
+    registered = list[tuple[int, int, Future[tuple[Array | None, Array | None]], Array, Array]]()
     with ThreadPoolExecutor(_N_THREADS) as pool:
         for i, (row, frames) in enumerate(zip(rows, moments, strict=True)):
             velocity = path.velocity(row)
@@ -224,19 +227,30 @@ def _gather(
                 evidence.edge_by_parameter[i, j] = outline.edge @ columns + outline.edge_by_offset @ shifts
                 scene = empty.behind(j, view, silhouette) if silhouette.is_whole else None
                 if scene is not None:
-                    found = pool.submit(_register, silhouette, view.rgb, scene, in_light=in_light)
+                    found = pool.submit(_register, render_model, silhouette, view.rgb, scene)
                     registered.append((i, j, found, outline.by_twist, outline.by_twist @ columns + shifts))
     for i, j, found, by_twist, by_parameter in registered:
-        if (offset := found.result()) is not None:
+        offset, own_reach = found.result()
+        if own_reach is not None:
+            reach[i, j] = own_reach
+        if offset is not None:
             evidence.offset[i, j], evidence.by_twist[i, j], evidence.is_seen[i, j] = offset, by_twist, True
             evidence.by_parameter[i, j] = by_parameter
-    return evidence
+    return evidence, reach
 
 
-def _register(silhouette: Silhouette, rgb: Image, scene: Image, *, in_light: bool) -> Array | None:
-    """Return the offset (4,) of a silhouette in an image, refined by its light or not; None where it is not found."""
-    offset = register(silhouette, foreground(rgb, scene, silhouette))
-    return offset if offset is None or not in_light else register_light(silhouette, offset, rgb, scene)
+def _register(
+    render_model: RenderModel, silhouette: Silhouette, rgb: Image, scene: Image
+) -> tuple[Array | None, Array | None]:
+    """Return the offset (4,) of a silhouette in an image, None where it is not found, and how far a person reaches.
+
+    That of a thing is refined by its light.
+    """
+    shown = foreground(rgb, scene, silhouette)
+    offset = register(silhouette, shown)
+    if render_model.model.has_joints:
+        return offset, reach_beyond(silhouette, rgb, scene, shown, render_model.segment_of_part)
+    return offset if offset is None else register_light(silhouette, offset, rgb, scene), None
 
 
 def _with_fall(

@@ -20,6 +20,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.offset_equations import foreground_equations
 from airborne.types import Array
 
+_SIDES = 27  # that a part may face: along each of its axes forward, back or neither
 N_SIMILARITY = 4  # shift right, shift down [px], turn clockwise [rad], log scale, about the silhouette's middle
 _LONGEST_PX = 220  # images are reduced until the silhouette is no longer
 _SHORTEST_PX = 16  # a smaller silhouette is not registered
@@ -53,6 +54,11 @@ class Silhouette:
     box: tuple[int, int, int, int]  # x0, y0, x1, y1 of the view's image that it covers
     to_view: Array  # (2,) view pixels a pixel, right and down
     is_whole: bool  # the image's border cuts nothing off
+
+    @property
+    def part(self) -> NDArray[np.int64]:
+        """The part that each pixel shows: (h, w), -1 where there is none."""
+        return self.side // _SIDES
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +103,7 @@ def draw_silhouette(render_model: RenderModel, posed: PosedBody, camera: Camera)
 def _sides(maps: SurfaceMaps) -> NDArray[np.int64]:
     """Return a number for every side of every part, by where it faces: (h, w), -1 where there is none."""
     x, y, z = np.rint(maps.normals).astype(int)
-    return np.where(maps.part >= 0, 27 * maps.part.astype(int) + 9 * x + 3 * y + z + 13, -1)
+    return np.where(maps.part >= 0, _SIDES * maps.part.astype(int) + 9 * x + 3 * y + z + 13, -1)
 
 
 def _mask_corners(render_model: RenderModel, posed: PosedBody, camera: Camera) -> tuple[Array, Array] | None:
