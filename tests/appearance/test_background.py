@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.appearance.background import START_SD, BackgroundModel, inpaint
+from airborne.appearance.background import START_SD, TILE_PX, BackgroundModel, FirstImage, inpaint
 from tests.support.tolerances import sampled
 
 SINGLE = 1e-4  # float32, of grey levels in the hundreds
@@ -136,3 +136,17 @@ def test_inpainting_from_no_observation_returns_false():
     mean = np.zeros((*SHAPE, 3), np.float32)
     assert not inpaint(mean, np.zeros(SHAPE, np.uint8), np.empty_like(mean))
     assert inpaint(mean, np.ones(SHAPE, np.uint8), np.empty_like(mean))
+
+
+def test_a_whole_first_image_is_learned_where_it_is_asked_for_and_says_the_same():
+    rng = np.random.default_rng(4)
+    whole, covered = rng.integers(0, 255, (300, 400, 3)).astype(np.uint8), rng.random((300, 400)) < 0.2
+    at_once, lazy = BackgroundModel().learn(whole, covered, (0, 0)), BackgroundModel(first=FirstImage(whole, covered))
+    region, corner = rng.integers(0, 255, (40, 50, 3)).astype(np.uint8), (230, 240)
+    nothing = np.zeros(region.shape[:2], bool)
+    for model in (lazy.learn(region, nothing, corner), lazy):
+        eager = at_once if model is lazy else at_once.learn(region, nothing, corner)
+        for own, other in zip(model.crop((200, 200), (100, 200)), eager.crop((200, 200), (100, 200)), strict=True):
+            np.testing.assert_array_equal(own, other)
+    assert lazy.first is not None and set(lazy.first.tiles) == {(1, 1), (1, 2), (1, 3), (2, 1), (2, 2), (2, 3)}
+    assert lazy.first.tile((2, 3))[300 - 2 * TILE_PX :, :, 4].max() == 0  # below the image nothing is known

@@ -31,13 +31,32 @@ _UNKNOWN[..., 3] = START_SD
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FirstImage:
+    """A whole image that a background is learned from, tile by tile, each when it is first asked for."""
+
+    rgb: NDArray[np.uint8]  # (h, w, 3)
+    covered: NDArray[np.bool_]  # (h, w) where the body may be
+    tiles: dict[tuple[int, int], _Tile] = field(default_factory=dict)
+
+    def tile(self, at: tuple[int, int]) -> _Tile:
+        """Return what the image says of a tile."""
+        if at not in self.tiles:
+            rows, columns = (slice(TILE_PX * k, TILE_PX * (k + 1)) for k in at)
+            rgb, tile = self.rgb[rows, columns], _UNKNOWN.copy()
+            update_background(rgb, self.covered[rows, columns], tile[: rgb.shape[0], : rgb.shape[1]])
+            self.tiles[at] = tile
+        return self.tiles[at]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class BackgroundModel:
     """The background in one camera; a value, kept in tiles: one that has learned shares all other tiles with the old.
 
     A region is its first pixel (x, y) and its size (height, width).
     """
 
-    tiles: Mapping[tuple[int, int], _Tile] = field(default_factory=dict)  # by row and column; none: unknown
+    tiles: Mapping[tuple[int, int], _Tile] = field(default_factory=dict)  # learned since, by row and column
+    first: FirstImage | None = None  # that tells of all other tiles; None: nothing is known of them
 
     def crop(self, corner: tuple[int, int], size: tuple[int, int]) -> BackgroundPixels:
         """Copy what is known of a region."""
@@ -49,15 +68,20 @@ class BackgroundModel:
     def tiles_of(self, corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[_Tile, _Slices, _Slices]]:
         """Yield the tiles that a region touches, and what they share, in the region and in the tile."""
         for at, in_region, in_tile in _tiles_of(corner, size):
-            yield self.tiles.get(at, _UNKNOWN), in_region, in_tile
+            yield self._tile(at), in_region, in_tile
 
     def learn(self, rgb: NDArray[np.uint8], covered: NDArray[np.bool_], corner: tuple[int, int]) -> BackgroundModel:
         """Learn from a region's image rgb (h, w, 3); covered (h, w) where the body may be."""
         learned = dict(self.tiles)
         for at, in_region, in_tile in _tiles_of(corner, covered.shape):
-            learned[at] = self.tiles.get(at, _UNKNOWN).copy()
+            learned[at] = self._tile(at).copy()
             update_background(rgb[in_region], covered[in_region], learned[at][in_tile])
-        return BackgroundModel(learned)
+        return BackgroundModel(learned, self.first)
+
+    def _tile(self, at: tuple[int, int]) -> _Tile:
+        if (tile := self.tiles.get(at)) is not None:
+            return tile
+        return _UNKNOWN if self.first is None else self.first.tile(at)
 
 
 def _tiles_of(corner: tuple[int, int], size: tuple[int, int]) -> Iterator[tuple[tuple[int, int], _Slices, _Slices]]:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.appearance.background import BackgroundModel, BackgroundPixels
+from airborne.appearance.background import BackgroundModel, BackgroundPixels, FirstImage
 from airborne.appearance.brightness import brightness_ratios, divide_brightness
 from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, posterior
 from airborne.cameras import Camera
@@ -95,7 +95,7 @@ class Appearance:
             rgb = region.view.rgb
             everywhere = np.zeros(rgb.shape[:2], bool)
             region.crop(everywhere)[:] = covered
-            background = BackgroundModel().learn(rgb, everywhere, (0, 0))
+            background = BackgroundModel(first=FirstImage(rgb, everywhere))
         return replace(self, backgrounds={**self.backgrounds, region.source: background})
 
     def background_pixels(self, region: Region) -> BackgroundPixels:
