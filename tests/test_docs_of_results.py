@@ -8,7 +8,8 @@ from dataclasses import fields
 import pytest
 
 from airborne.body.human import BALL_LIMITS_DEG, HINGE_LIMITS_DEG, PARENTS
-from airborne.evaluation import PlayerErrors, PlayersComparison
+from airborne.evaluation import FlightComparison, FlightErrors, PlayerErrors, PlayersComparison
+from airborne.evaluation.flight import Turns
 from airborne.evaluation.jump_errors import JumpErrors
 from airborne.evaluation.players import PartErrors
 from airborne.export.figures import write_figures
@@ -139,6 +140,12 @@ def test_the_landmarks_of_a_person_are_documented():
 def test_every_number_of_a_comparison_of_players_is_documented(heading, values):
     rows = table_of(RESULTS, heading)
     assert {name for row in rows for name in named(row[0])} == {each.name for value in values for each in fields(value)}
+
+
+def test_every_number_of_a_comparison_of_a_flight_is_documented():
+    documented = {name for row in table_of(RESULTS, "Comparing a flight") for name in named(row[0])}
+    written = {each.name for value in (FlightComparison, FlightErrors, Turns) for each in fields(value)}
+    assert documented == written | {"questions"}
 
 
 def test_every_method_of_players_stands_in_the_page_on_legs():

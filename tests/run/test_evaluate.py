@@ -9,9 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.body.files import read_body
+from airborne.body import Inertia
+from airborne.body.files import read_body, write_body
 from airborne.cameras import read_rig, write_pose2sim
-from airborne.errors import ResultError
+from airborne.errors import BodyError, ResultError
 from airborne.motion import Motion, MotionWriter, write_joints
 from airborne.motion.covariance_file import write_covariances
 from airborne.run.evaluate import assess, evaluate_agreement
@@ -56,6 +57,19 @@ def test_with_a_folder_of_its_own_a_comparison_leaves_the_run_as_it_is(run):
     assert in_process("evaluate", run, "--joints", run.parent / "higher.csv", "-o", out) == 0
     assert contents_of(run) == before
     assert "agreement_methods.txt" in files_of(out)
+
+
+def test_a_flight_is_compared_and_kept_in_the_summary(run, capsys):
+    flight, body = run.parent / "flight.csv", read_body(run / "body.toml")
+    times = Motion.collect([estimate(k) for k in range(3)]).time_s
+    flight.write_text("time_s,somersault_deg\n" + "".join(f"{t},0\n" for t in times))
+    with pytest.raises(BodyError, match="has no mass"):
+        assess(run, None, None, flight=flight)
+    heavy = tuple(replace(each, inertia=Inertia(3.0, np.zeros(3), np.eye(3))) for each in body.segments)
+    write_body(run / "body.toml", replace(body, segments=heavy))
+    assert in_process("evaluate", run, "--flight", flight) == 0
+    assert "against the flight\n3 of 3 reference times matched" in capsys.readouterr().out
+    assert json.loads((run / "summary.json").read_text())["reference_flight"]["quantities"]["somersault"]["n"] == 3
 
 
 def test_nothing_to_compare_with_is_refused(run):

@@ -26,7 +26,7 @@ from airborne.cameras.detections import Detections, write_detections
 from airborne.cameras.formats.dltdv import read_digitisation, triangulate_digitisation, write_digitisation
 from airborne.cameras.formats.options import FileOptions
 from airborne.cameras.skeletons import SKELETONS
-from airborne.evaluation import read_clicked_frames, read_joint_paths, read_players_truth, read_truth
+from airborne.evaluation import read_clicked_frames, read_flight_paths, read_joint_paths, read_players_truth, read_truth
 from airborne.evaluation.players_truth import read_reference_jumps
 from airborne.evaluation.variables import read_joint_angles
 from airborne.export.conversion import ConversionOptions, convert
@@ -227,6 +227,9 @@ def results(folder):
         "2\t0.02\t1\t2\t3\t4\t5\t6\n"
     )
     yield case("TRC", trc, lambda: read_joint_paths(trc))
+    flight = folder / "flight.csv"
+    flight.write_text("time_s,com_x_m,com_y_m,com_z_m,somersault_deg\n0,0.1,0.2,1.3,5\n0.02,0.1,,1.4,9\n")
+    yield case("flight", flight, lambda: read_flight_paths(flight))
     angles = folder / "angles.csv"
     angles.write_text("time_s,knee_x_rad,knee_y_rad,knee_z_rad\n0,0.1,0.2,0.3\n0.02,0.1,,0.3\n")
     yield case("joint angles", angles, lambda: read_joint_angles(angles))

@@ -16,6 +16,7 @@ _AGAINST = {
     "digitised": "against points clicked by hand",
     "joints": "against the paths of the joints",
     "smooth_joints": "the smoothed joints against them",
+    "reference_flight": "against the flight",
 }
 
 
@@ -37,6 +38,10 @@ def evaluate_command(
     joint_angles: Annotated[
         Path | None, typer.Option(help="Joint angles: time_s,<joint>_x_rad,<joint>_y_rad,<joint>_z_rad,...")
     ] = None,
+    flight: Annotated[
+        Path | None,
+        typer.Option(help="A flight: time_s,com_x_m,...,L_x_kg_m2_s,...,somersault_deg,tilt_deg,twist_deg, or some."),
+    ] = None,
     repeat: Annotated[
         list[Path] | None, typer.Option(help="Another run of the same trial, for the repeatability; may be repeated.")
     ] = None,
@@ -48,38 +53,42 @@ def evaluate_command(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare a run with the truth, with paths of joints, or with points clicked by hand; players with their truth.
+    """Compare a run with the truth, with paths of joints, a flight, or points clicked by hand; players with theirs.
 
     Also reports agreement (bias, limits of agreement, ICC, SEM), and repeatability between runs or people.
 
     Example: airborne evaluate results truth.csv --digitised digitised.csv --repeat results2
     """
     from airborne.motion.run_folder import note_if_unfinished
-    from airborne.run.evaluate import assess, evaluate_agreement
+    from airborne.run.evaluate import Comparisons, assess, evaluate_agreement
 
     others = repeat or joint_angles
-    is_others_alone = others and not (truth or digitised or joints)
-    comparisons = {} if is_others_alone else assess(results, truth, digitised, joints, keep=output is None)
-    agreement = evaluate_agreement(
-        results,
-        truth,
-        digitised,
-        joints,
-        joint_angles=joint_angles,
-        repeats=repeat or (),
-        operators=operator or (),
-        out=output,
-        comparisons=comparisons,
-    )
-    if as_json:
-        print(
-            json.dumps({name: comparison.to_dict() for name, comparison in comparisons.items()} | agreement.to_dict())
+    of_series = truth or digitised or joints
+    comparisons: Comparisons = {}
+    if of_series or flight or not others:
+        comparisons = assess(results, truth, digitised, joints, flight=flight, keep=output is None)
+    agreement = None
+    if of_series or others:
+        agreement = evaluate_agreement(
+            results,
+            truth,
+            digitised,
+            joints,
+            joint_angles=joint_angles,
+            repeats=repeat or (),
+            operators=operator or (),
+            out=output,
+            comparisons=comparisons,
         )
+    if as_json:
+        numbers = {name: comparison.to_dict() for name, comparison in comparisons.items()}
+        print(json.dumps(numbers if agreement is None else numbers | agreement.to_dict()))
         return
     for name, comparison in comparisons.items():
         print(_AGAINST[name])
         print(comparison.describe())
-    print(agreement.describe())
+    if agreement is not None:
+        print(agreement.describe())
     if (note := note_if_unfinished(results)) is not None:
         print(f"note: {note}")
     if doubtful := [_AGAINST[name] for name, comparison in comparisons.items() if comparison.questions]:

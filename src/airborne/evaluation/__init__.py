@@ -1,7 +1,7 @@
 """Evaluation: a `Motion` and a reference come in; errors with their units, and agreement, go out.
 
-A reference is a table of true poses, paths of joints, digitised points (paper B), joints and jumps of several players,
-or a known pose that a search has to recover.
+A reference is a table of true poses, paths of joints, a flight, digitised points (paper B), joints and jumps of several
+players, or a known pose that a search has to recover.
 Independent of images and searches.
 """
 
@@ -27,6 +27,7 @@ from airborne.evaluation.digitised import (
     read_digitised,
     write_clicked_frames,
 )
+from airborne.evaluation.flight import FlightComparison, FlightErrors, FlightPaths, compare_flight, read_flight_paths
 from airborne.evaluation.icc import Reliability, reliability
 from airborne.evaluation.joint_files import JointPaths, landmark_of, read_joint_paths
 from airborne.evaluation.joints import JointComparison, JointErrors, compare_joints
@@ -41,6 +42,9 @@ __all__ = [
     "DigitisedComparison",
     "DigitisedPoints",
     "DigitisedPoses",
+    "FlightComparison",
+    "FlightErrors",
+    "FlightPaths",
     "JointComparison",
     "JointErrors",
     "JointPaths",
@@ -59,6 +63,7 @@ __all__ = [
     "assess_players",
     "box_ends",
     "compare_digitised",
+    "compare_flight",
     "compare_joints",
     "compare_motion",
     "compare_players",
@@ -70,6 +75,7 @@ __all__ = [
     "perturb",
     "read_clicked_frames",
     "read_digitised",
+    "read_flight_paths",
     "read_joint_paths",
     "read_players_truth",
     "read_truth",

@@ -122,7 +122,7 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     - `method`, `timings_s` [s], `versions`, `inputs` (SHA-256 by file name): dictionaries of names and values
     - `cameras`: one dictionary for each camera, with `name` first
     - `truth`: `MotionComparison.to_dict()`; `digitised`: `DigitisedComparison.to_dict()`; `joints` and
-      `smooth_joints`: `JointComparison.to_dict()`
+      `smooth_joints`: `JointComparison.to_dict()`; `reference_flight`: `FlightComparison.to_dict()`
     - `joint_statuses`: by landmark, then by status, in how many frames; see `count_statuses`
     - `self_check`: what the pictures say against the files, see `Finding.to_dict`
     - `flight`: `FlightSummary.to_dict()`
@@ -201,6 +201,8 @@ def _comparisons(summary: Mapping[str, Any]) -> Iterator[_Comparison]:
     for key, title in (("joints", "Compared with the paths of the joints"), ("smooth_joints", "The same, smoothed")):
         if summary.get(key):
             yield _joint_comparison(title, summary[key])
+    if summary.get("reference_flight"):
+        yield _flight_comparison(summary["reference_flight"])
 
 
 def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
@@ -251,6 +253,19 @@ def _joint_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
         *_doubts(comparison),
     ]
     return _Comparison(title, table, lines)
+
+
+def _flight_comparison(comparison: Mapping[str, Any]) -> _Comparison:
+    keys, found = ("rms", "largest", "bias", "rms_without_bias"), comparison["quantities"]
+    rows = [(f"{name} [{each['unit']}]", *(each[key] for key in keys)) for name, each in found.items()]
+    table = HtmlTable(rows, ("", "RMS", "largest", "mean", "RMS without the mean"))
+    turns = [
+        f"{name}: {each['measured_rev']:.3f} turns, {each['reference_rev']:.3f} in the reference."
+        for name, each in comparison["turns"].items()
+        if None not in each.values()
+    ]
+    matched = f"{comparison['n_matched']} of {comparison['n_reference']} reference times matched."
+    return _Comparison("Compared with a flight", table, [matched, *turns, *_doubts(comparison)])
 
 
 def _self_check_table(findings: Sequence[Mapping[str, Any]]) -> HtmlTable | None:

@@ -175,10 +175,11 @@ def evaluate(
     digitised: FilePath | None = None,
     joints: FilePath | None = None,
     joint_angles: FilePath | None = None,
+    flight: FilePath | None = None,
     repeats: FilePath | Run | Sequence[FilePath | Run] = (),
     operators: FilePath | Sequence[FilePath] = (),
 ) -> Mapping[str, Comparison | AgreementReport]:
-    """Compare a run with the truth, with clicked points, with paths of joints; into its summary too.
+    """Compare a run with the truth, with clicked points, with paths of joints, with a flight; into its summary too.
 
     Returns a comparison for each, by name, which describes itself (`.describe()`). With `joint_angles`, with `repeats`,
     other runs of the same trial, or `operators`, other people's clicks beside `digitised`, there is `agreement` too: of
@@ -192,13 +193,15 @@ def evaluate(
     references = [None if path is None else to_path(path) for path in (truth, digitised, joints)]
     angles = None if joint_angles is None else to_path(joint_angles)
     runs, clicks = ([folder_of(one) for one in as_list(each)] for each in (repeats, operators))
-    is_alone = not any(references)
+    of_flight = None if flight is None else to_path(flight)
+    is_alone = not any((*references, of_flight))
     if is_alone and not (angles or runs or clicks):
         raise AirborneError(
-            "nothing to compare with; give truth, digitised, joints or joint_angles, the path of a table, or repeats"
+            "nothing to compare with; give truth, digitised, joints, joint_angles or flight, the path of a table, or "
+            "repeats"
         )
     folder = folder_of(run)
-    compared = {} if is_alone else assess(folder, *references)
+    compared = {} if is_alone else assess(folder, *references, flight=of_flight)
     if angles or runs or clicks:
         agreement = evaluate_agreement(
             folder, *references, joint_angles=angles, repeats=runs, operators=clicks, comparisons=compared

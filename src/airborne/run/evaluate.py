@@ -18,6 +18,7 @@ from airborne.errors import ResultError
 from airborne.evaluation import (
     Agreement,
     DigitisedComparison,
+    FlightComparison,
     JointComparison,
     MotionComparison,
     PlayersComparison,
@@ -26,11 +27,13 @@ from airborne.evaluation import (
     analyse_repeatability,
     assess_players,
     compare_digitised,
+    compare_flight,
     compare_joints,
     compare_motion,
     describe_left_out,
     fit_digitised_poses,
     read_digitised,
+    read_flight_paths,
     read_joint_paths,
     read_truth,
 )
@@ -50,7 +53,7 @@ from airborne.run.folder import open_results
 from airborne.run.provenance import versions
 from airborne.run.reference_series import body_series, players_series
 
-Comparison = MotionComparison | DigitisedComparison | JointComparison | PlayersComparison
+Comparison = MotionComparison | DigitisedComparison | JointComparison | FlightComparison | PlayersComparison
 Comparisons = Mapping[str, Comparison]
 
 _SERIES_OF = {"truth": "the truth", "joints": "the joints", "digitised": "points digitised"}  # by comparison
@@ -58,24 +61,32 @@ _LARGEST_METHODS_BYTES = 1_000_000  # a hundred comparisons; anything larger was
 
 
 def assess(
-    folder: Path, truth: Path | None, digitised: Path | None, joints: Path | None = None, *, keep: bool = True
+    folder: Path,
+    truth: Path | None,
+    digitised: Path | None,
+    joints: Path | None = None,
+    *,
+    flight: Path | None = None,
+    keep: bool = True,
 ) -> Comparisons:
     """Compare the run in a folder; `keep` puts it into the run's summary, of one body into figures and report too.
 
     `joints` are paths of joints as `read_joint_paths` reads them, with which smoothed joints in the folder are compared
-    too. Raises ResultError where the folder holds no finished run or a file cannot be read.
+    too, `flight` what `read_flight_paths` reads. Raises ResultError where the folder holds no finished run or a file
+    cannot be read.
     """
     if holds_players(folder):
-        return _assess_players(folder, truth, is_alone=digitised is None and joints is None, keep=keep)
+        return _assess_players(folder, truth, is_alone=digitised is joints is flight is None, keep=keep)
     motion, model = read_body_run(folder)
-    if truth is None and digitised is None and joints is None:
+    if truth is digitised is joints is flight is None:
         raise ResultError(
-            "nothing to compare with; give a truth.csv, --digitised, --joints, --joint-angles, or --repeat with a run"
+            "nothing to compare with; give a truth.csv, --digitised, --joints, --flight, --joint-angles, or --repeat "
+            "with a run"
         )
     if not motion.has_pose.any():
         raise ResultError(f"{folder}: the body was found in no frame, so there is nothing to compare; track again")
     symmetry = symmetries(model)
-    comparisons: dict[str, MotionComparison | DigitisedComparison | JointComparison] = {}
+    comparisons: dict[str, MotionComparison | DigitisedComparison | JointComparison | FlightComparison] = {}
     true_poses = clicked = None
     if truth is not None:
         true_poses = read_truth(truth)
@@ -89,6 +100,8 @@ def assess(
         comparisons["joints"] = compare_joints(motion, model, paths)
         if smooth.is_file():
             comparisons["smooth_joints"] = compare_joints(motion, model, paths, read_joint_paths(smooth))
+    if flight is not None:
+        comparisons["reference_flight"] = compare_flight(motion, model, read_flight_paths(flight))
     if not keep:
         return comparisons
     with open_results(folder):
@@ -107,7 +120,7 @@ def assess(
 
 def _assess_players(folder: Path, truth: Path | None, *, is_alone: bool, keep: bool) -> Comparisons:
     if truth is None or not is_alone:
-        leave_out = "" if is_alone else "leave clicked points and joints out and "
+        leave_out = "" if is_alone else "leave clicked points, joints and flights out and "
         raise ResultError(
             f"{folder} holds a run of players, which is compared with a truth of players only; {leave_out}give a "
             "truth.csv"

@@ -14,8 +14,10 @@ from airborne.body import human18
 from airborne.body.files import read_body
 from airborne.cameras import Rig, read_rig
 from airborne.errors import BodyError, TrialError
+from airborne.evaluation import read_flight_paths
 from airborne.evaluation.truth import read_truth
 from airborne.geometry.rotations import angles_from_matrix, geodesic, matrix_from_angles, unwrap
+from airborne.motion.flight.momentum import centre_of_mass
 from airborne.synthetic import half_twist, scene_frames, somersault_scene, write_trial
 from airborne.synthetic.flight.somersault import MASS_KG, PAPER_RANGES, STATURE_M
 from airborne.synthetic.throw.measurements import start_pose
@@ -225,6 +227,12 @@ def test_trial_has_its_truth_and_its_body(written):
         position = dict(zip([landmark.name for landmark in body.landmarks], posed.landmarks, strict=True))[row["joint"]]
         np.testing.assert_allclose([float(row[f"{axis}_m"]) for axis in "xyz"], position, atol=ROUNDTRIP)
         assert float(row["time_s"]) == int(row["frame"]) / 50
+    true = read_flight_paths(folder / "truth_flight.csv")
+    com = [centre_of_mass(MODEL.with_pose(flight.pose(i)))[0] for i in range(6)]
+    np.testing.assert_allclose(true.com, com, atol=SOLVED)
+    np.testing.assert_array_equal(true.angular_momentum, [scene.flight.takeoff.angular_momentum] * 6)
+    turned = np.radians(np.stack([true.rotation_deg[name] for name in ("somersault", "tilt", "twist")], axis=1))
+    np.testing.assert_allclose(matrix_from_angles(turned), flight.R, atol=ROUNDTRIP)
     assert calls[-1] == (6, 6)
     assert not (folder / "control_points.csv").exists()
 

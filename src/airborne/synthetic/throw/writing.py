@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from airborne.body.files import write_body
 from airborne.cameras import write_pose2sim
+from airborne.constants import GRAVITY_M_S2
 from airborne.errors import TrialError
+from airborne.geometry.rotations import angles_from_matrix, unwrap
 from airborne.io.writing import write_text
+from airborne.synthetic.flight.articulated import Takeoff
 from airborne.synthetic.flight.rigid import SampledFlight
 from airborne.synthetic.flight.somersault import PictureStyle, Skill, SomersaultPreset, Target, somersault_scene
 from airborne.synthetic.throw.measurements import control_points, digitise, lights_table, start_pose
@@ -62,8 +65,9 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
     `<camera>.mp4`, `calib_true.toml` (exact), the body's file, `truth.csv` (the root's pose in every picture) and
     `trial.toml` (with a hand-set start). Of a surveyed scene also `control_points.csv` (surveyed exactly, clicked),
     `digitised.csv` (clicked) and `lights.json` (roughly measured); of a body with joints `truth_joints.csv` (its
-    landmarks) and `truth_angles.csv`. `progress` is called after every image. Raises
-    TrialError for a folder that holds anything, unless `overwrite`: then files of these names are replaced.
+    landmarks) and `truth_angles.csv`, of a person who moves freely `truth_flight.csv`. `progress` is called after every
+    image. Raises TrialError for a folder that holds anything, unless `overwrite`: then files of these names are
+    replaced.
     """
     with fill_folder(folder, overwrite) as part:
         flight = scene.flight(np.array([float(scene.time_s(i)) for i in range(scene.n_pictures)]))
@@ -76,6 +80,8 @@ def write_trial(scene: Scene, folder: Path, *, overwrite: bool = False, progress
         if _has_joints(scene):
             _write_landmarks(part / "truth_joints.csv", scene, flight)
             _write_angles(part / "truth_angles.csv", scene, flight)
+        if isinstance(scene.flight, Skill) and not scene.flight.is_rigid:
+            _write_flight(part / "truth_flight.csv", scene, scene.flight.takeoff, flight)
         _write_truth(part / "truth.csv", scene, flight)
         _write_videos(part, scene, progress)
         write_text(part / _TRIAL, trial_toml(scene))
@@ -230,6 +236,18 @@ def _write_angles(path: Path, scene: Scene, flight: SampledFlight) -> None:
         [_index_name(scene), "time_s", *joints],
         [[i, *map(repr, row.tolist())] for i, row in enumerate(values)],
     )
+
+
+def _write_flight(path: Path, scene: Scene, takeoff: Takeoff, flight: SampledFlight) -> None:
+    """Write the centre of mass, which falls, the angular momentum, which lasts, and the root's rotation."""
+    t = flight.time_s[:, None]
+    com = takeoff.centre + t * takeoff.velocity - 0.5 * GRAVITY_M_S2 * t**2 * [0, 0, 1]
+    momentum = np.tile(takeoff.angular_momentum, (len(t), 1))
+    rotation_deg = np.degrees(unwrap(angles_from_matrix(flight.R), flight.time_s))
+    values = np.column_stack([t, com, momentum, rotation_deg])
+    of_axes = [f"{name}_{axis}_{unit}" for name, unit in (("com", "m"), ("L", "kg_m2_s")) for axis in "xyz"]
+    header = [_index_name(scene), "time_s", *of_axes, "somersault_deg", "tilt_deg", "twist_deg"]
+    _write_csv(path, header, [[i, *map(repr, row.tolist())] for i, row in enumerate(values)])
 
 
 def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence]) -> None:
