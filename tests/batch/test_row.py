@@ -29,6 +29,13 @@ def test_frames_may_be_tracked_where_joints_are_not(tmp_path):
     assert "share_joints_tracked" not in row(tmp_path)
 
 
+@pytest.mark.parametrize(("n", "said"), [(0, "no frame is tracked"), (1, "1 of 10 frames are tracked"), (5, None)])
+def test_a_run_that_is_mostly_untracked_is_an_alarm(tmp_path, n, said):
+    found = row(tmp_path, n_tracked=n, n_uncertain=10 - n)
+    assert found["n_alarms"] == (said is not None)
+    assert found["findings"].startswith(said or "")
+
+
 def test_a_rise_has_the_deviations_of_single_frames(tmp_path):
     t = np.arange(60) / 50
     falls = np.clip(t, 0.4, 0.8) - 0.4

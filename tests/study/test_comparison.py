@@ -180,6 +180,15 @@ def test_failed_trials_are_named_in_the_text(tmp_path):
     assert "\nLeft out\nnothing\n" in sound
 
 
+def test_trials_that_are_mostly_untracked_are_left_out_and_alarms_are_named(tmp_path):
+    rows = [{"trial": f"{k}", "athlete": f"a{k % 4}", "condition": "xy"[k // 4], "rise_m": 0.1 * k} for k in range(8)]
+    rows[5] |= {"share_tracked": 0.9, "findings": "camera cam2 seems late"}
+    rows.append({"trial": "torn", "athlete": "a0", "condition": "x", "rise_m": 7.0, "share_tracked": 0.03})
+    text = write_comparison(write_results(tmp_path / "in", rows), tmp_path / "out", ["rise_m"])
+    assert "\nLeft out\ntorn: only 3% of its frames are tracked\n" in text
+    assert text.startswith("Read this first\n5: camera cam2 seems late\n")
+
+
 def test_a_folder_without_a_batch_is_one_line(tmp_path):
     with pytest.raises(
         AirborneError, match=r"has no trials\.csv; give the folder of a batch, which `airborne batch` has finished"

@@ -114,8 +114,10 @@ def track_command(
         if run.was_finished:
             print(f"{output} holds this run, finished; nothing was tracked again (--overwrite tracks it anew)")
         print(f"{_describe(run.summary, output)}\nresults: {_describe_results(output)}")
+    from airborne.export.summary import is_hardly_tracked
+
     is_found = run.summary["n_tracked"] or (first_frame and run.summary.get("n_uncertain"))
-    if not is_found:
+    if not is_found or is_hardly_tracked(run.summary):
         raise typer.Exit(1)
 
 

@@ -85,6 +85,11 @@ def is_mostly_untracked(head: Mapping[str, Any]) -> bool:
     return bool(head["n_tracked"] < head["n_frames"] / 2)  # chosen: most of what is said rests on the others then
 
 
+def is_hardly_tracked(head: Mapping[str, Any]) -> bool:
+    """Whether of several frames a tenth or less are tracked, so that the run says nothing."""
+    return head["n_frames"] > 1 and bool(head["n_tracked"] <= 0.1 * head["n_frames"])  # chosen
+
+
 def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
     """Yield, in plain sentences, what the reader of a `headline` must not miss; nothing if every frame is tracked."""
     n, n_posed = head["n_frames"], head["n_tracked"] + head["n_uncertain"]

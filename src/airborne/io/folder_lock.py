@@ -44,9 +44,9 @@ def sole_writer(folder: Path, address: str = "") -> Iterator[None]:
     file = _lock(folder)
     holder = f"process {os.getpid()} on {socket.gethostname()} since {datetime.now():%F %T}"
     try:
-        os.ftruncate(file, 0)
-        os.write(file, f"{holder}, {address}".rstrip(", ").encode())
         with explain_full_disk(folder):  # of whatever is written meanwhile, also where a file is closed
+            os.ftruncate(file, 0)
+            os.write(file, f"{holder}, {address}".rstrip(", ").encode())
             yield
     finally:
         (folder / LOCK).unlink(missing_ok=True)

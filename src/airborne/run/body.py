@@ -19,6 +19,7 @@ from airborne.body.files import find_mesh_files, write_body
 from airborne.calibration.from_points import Calibration
 from airborne.export import headline
 from airborne.export.overlays import OverlaysAs, OverlayVideos
+from airborne.export.summary import is_hardly_tracked
 from airborne.motion import Motion, MotionWriter, flight_summary, read_estimates, read_motion, revise_motion, sort_rows
 from airborne.motion.files import copy_motion
 from airborne.motion.joints import doubtful_segments
@@ -32,10 +33,10 @@ from airborne.run.key_misses import far_keys
 from airborne.run.keys import keys_of_frames
 from airborne.run.moving_mix_ups import look_at_silhouettes
 from airborne.run.opening import Opened
-from airborne.run.self_check import check_run
+from airborne.run.self_check import check_run, widen_by_fall
 from airborne.run.untracked import explain_by_silhouettes, explain_untracked
 from airborne.run.wrong_colours import find_wrong_colours
-from airborne.tracking import Estimate, Status
+from airborne.tracking import Estimate
 from airborne.tracking.evidence import PoseEvidence
 from airborne.tracking.first_pose import FirstPose
 from airborne.tracking.methods import sample_body_colours, tracker_of
@@ -56,8 +57,6 @@ _UNCERTAINTY = (
     "times. They do not include wrong lengths and girths of single segments."
 )
 _CALIBRATION_UNCERTAINTY = " They include a shift of each camera's whole image due to calibration."
-
-_HARDLY_ANY = 0.1  # chosen: of the frames: so few are tracked that the run says nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,28 +223,32 @@ class BodyRun:
         if self._fits_whole_run:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))
             timings_s["whole_run"] = time.monotonic() - begun_s - timings_s["self_check"]
-        motion = checked.motion if fitted is None else fitted.motion
-        if checked.doubtful_joints is not None:  # the fit takes what the images show of them
-            motion = replace(motion, uncertain_joints=motion.uncertain_joints | checked.doubtful_joints)
+        motion = checked.doubt_joints(checked.motion if fitted is None else fitted.motion)
         revise_motion(folder / self.table, motion)
         if checked.found is not None:
             write_uncertainty(tables_of(folder) / "uncertainty.csv", motion, checked.found.constant_at(motion.index))
         measured = write_tables(folder, motion, model)
+        if measured.wrong_fall is not None:
+            motion = widen_by_fall(motion, measured.wrong_fall)
+            revise_motion(folder / self.table, motion)
+            measured = write_tables(folder, motion, model)
         if drawn == "videos" and self._is_drawn_at_end:
             self._draw_again(folder, drawn, motion, progress_of("drawing"))
         findings = [*([measured.wrong_fall.to_dict()] if measured.wrong_fall else []), *checked.findings]
-        of_colours = find_wrong_colours(model, motion, self.kept)
-        self.recording.events.extend([*checked.doubts, *of_colours, *far_keys(self.trial, model, motion, rig)])
-        if motion.count(Status.TRACKED) <= _HARDLY_ANY * len(motion) and len(motion) > 1 and not checked.is_start_wrong:
+        warnings = find_wrong_colours(model, motion, self.kept)
+        self.recording.events.extend([*checked.doubts, *far_keys(self.trial, model, motion, rig)])
+        is_explained = checked.is_start_wrong or measured.wrong_fall is not None
+        if is_hardly_tracked(head := headline(motion)) and not is_explained:
             seen = look_at_silhouettes(self.trial, self.recording) if self.found is None else self.found.silhouettes
             if (why := explain_by_silhouettes(seen)) is None:
                 args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
                 why = explain_untracked(*args)
-            self.recording.events.extend([why.sentence] if why.sentence not in self.recording.events else [])
+            warnings += [why.sentence] if why.sentence not in self.recording.events else []
             findings = [] if why.is_mix_up else [each for each in findings if each["is_alarm"]]
         return motion, {
             "name": self.trial.name,
-            **headline(motion),
+            **head,
+            "warnings": warnings,
             **({} if measured.joint_statuses is None else {"joint_statuses": measured.joint_statuses}),
             **({} if measured.flight is None else {"flight": flight_summary(motion, measured.flight).to_dict()}),
             **({} if fitted is None else {"whole_run": fitted.surface}),

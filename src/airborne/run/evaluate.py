@@ -14,7 +14,7 @@ from typing import Any
 
 from airborne.body.symmetry import symmetries
 from airborne.cameras import read_rig
-from airborne.errors import ResultError
+from airborne.errors import ResultError, count_of
 from airborne.evaluation import (
     Agreement,
     DigitisedComparison,
@@ -39,11 +39,10 @@ from airborne.evaluation import (
 )
 from airborne.evaluation.agreement_tables import write_agreements, write_repeatability
 from airborne.evaluation.agreement_text import agreement_table, methods_text, repeatability_table
-from airborne.evaluation.variables import (
-    headline_series,
-)
+from airborne.evaluation.variables import headline_series
 from airborne.export import write_json
 from airborne.export.report import write_report
+from airborne.export.summary import is_mostly_untracked
 from airborne.export.viewer import body_viewer
 from airborne.io.text import read_text
 from airborne.io.writing import write_text
@@ -153,6 +152,7 @@ class AgreementReport:
     left_out: tuple[str, ...]  # points of the references that the body does not have
     folder: Path
     files: tuple[str, ...]  # in it
+    doubts: tuple[str, ...] = ()  # on the runs themselves, one line each
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers for a JSON file."""
@@ -168,7 +168,7 @@ class AgreementReport:
             lines += [f"agreement with {name}", agreement_table([row for row in rows if row.name in self.headlines])]
         for name, rows in self.repeats.items():
             lines += [f"between {name}", repeatability_table([row for row in rows if row.name in self.headlines])]
-        return "\n".join([*lines, f"wrote into {self.folder}: {', '.join(self.files)}"])
+        return "\n".join([*lines, *self.doubts, f"wrote into {self.folder}: {', '.join(self.files)}"])
 
 
 def evaluate_agreement(
@@ -247,7 +247,17 @@ def evaluate_agreement(
         )
         write_text(out / run_folder.AGREEMENT_METHODS, text)
     wrote = (*files, run_folder.AGREEMENT_METHODS)
-    return AgreementReport(agreements, repeatable, first, tuple(left_out), out, wrote)
+    doubts = tuple(doubt for each in (folder, *repeats) if (doubt := _doubt_run(each)))
+    return AgreementReport(agreements, repeatable, first, tuple(left_out), out, wrote, doubts)
+
+
+def _doubt_run(folder: Path) -> str:
+    """Say that hardly anything of the run in a folder can be compared, if that is so."""
+    summary = run_folder.read_summary(folder) if (folder / run_folder.SUMMARY).is_file() else None
+    if summary is None or not is_mostly_untracked(summary):
+        return ""
+    tracked = count_of(summary["n_tracked"], summary["n_frames"], "frame")
+    return f"{folder}: {tracked} tracked: how well it agrees says nothing"
 
 
 def _read_earlier(path: Path) -> str:

@@ -24,8 +24,8 @@ OUT_OF_SIGHT = "the start pose lies in no camera's image; check [start], in metr
 
 _AVERAGE_JOINTS = (
     "no joint of this person was given, so joints lie where an average person of this stature has them: by how much "
-    "this one differs, some centimetres at hips, shoulders, hands and head, is not in sd_m; give start.joints_m, "
-    "clicks or detections, or let `airborne fit-body` measure the body"
+    "this one differs, up to 8 cm at shoulders, hands and head, 5 cm at hips, knees and feet, is not in sd_m; give "
+    "start.joints_m, clicks or detections, or let `airborne fit-body` measure the body"
 )
 
 

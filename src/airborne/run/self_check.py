@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.cameras import Rig
+from airborne.constants import GRAVITY_M_S2
 from airborne.errors import count_of
 from airborne.motion import Motion
 from airborne.tracking import Doubt, Status
@@ -51,6 +52,12 @@ class CheckedRun:
     wrong: Sequence[WrongFall | PathFinding | WrongSize | FarReach] = ()  # what no camera or clock explains
     is_start_wrong: bool = False  # by its own landmarks
     doubtful_joints: NDArray[np.bool_] | None = None  # (joints,) of limbs for which the body is too small
+
+    def doubt_joints(self, motion: Motion) -> Motion:
+        """Return its motion, or what was fitted to the whole run, with the doubtful joints uncertain in all frames."""
+        if self.doubtful_joints is None:
+            return motion
+        return replace(motion, uncertain_joints=motion.uncertain_joints | self.doubtful_joints)
 
     @property
     def findings(self) -> list[dict[str, Any]]:
@@ -133,6 +140,23 @@ def check_run(
     checked = replace(checked, lasting=lasting, by_frame=None)  # what is beside the table may be of an end before
     doubtful = None if far is None else doubtful_joints(model, far)
     return CheckedRun(checked, found, tuple(sentences), wrong, is_start_wrong, doubtful)
+
+
+def widen_by_fall(motion: Motion, fall: WrongFall) -> Motion:
+    """Return a motion with the errors of a world as much too large as its fall says; frames with wide ones uncertain.
+
+    A world is too large about its origin, so that positions err by as large a share of their distances from there.
+    """
+    variance = (fall.gravity_m_s2 / GRAVITY_M_S2 - 1) ** 2 * np.sum(motion.position**2, axis=1)
+    lasting = np.zeros((len(motion), 6, 6)) if motion.lasting is None else motion.lasting.copy()
+    lasting[:, range(3), range(3)] += np.nan_to_num(variance)[:, None]
+    is_wide = (variance > UNCERTAIN_SD_M**2) & (motion.status == Status.TRACKED.value)
+    return replace(
+        motion,
+        lasting=lasting,
+        status=np.where(is_wide, Status.UNCERTAIN.value, motion.status),
+        doubts=np.where(is_wide, Doubt.POSITION.value, motion.doubts),
+    )
 
 
 def _excess(covariance: Array, rough: Array) -> Array:

@@ -183,9 +183,11 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     tracked_s = time.monotonic()
     motion, summary = subject.finish(folder, options.drawn, options.of_stage)
     summary |= corrections_of(subject.trial, motion.index.tolist())
+    warnings = summary.pop("warnings", [])  # of finishing
     summary |= provenance_of(subject.trial, recording, subject.calibration, identity["inputs"])
     summary["warnings"] += [
         *subject.warnings(),
+        *warnings,
         *lost_keys(subject.trial, motion),
         *joint_warnings(summary.get("joint_statuses", {})),
         *players_warnings(summary),
@@ -194,7 +196,7 @@ def _run(subject: Subject[Found, AnyMotion], options: _Options, connection: Exit
     if (folder / EXPORTS).is_dir():
         summary["warnings"].append(f"{EXPORTS}/ is of the run before; `airborne export` writes it anew")
     if options.drawn is not None:
-        summary["warnings"] += names_not_drawn([subject.trial.name, *recording.rig.names, *subject.names])
+        summary["events"] += names_not_drawn([subject.trial.name, *recording.rig.names, *subject.names])
     summary["tables"] = list_tables(folder)
     if isinstance(recording, LiveRecording):
         summary["live"] = {

@@ -15,6 +15,7 @@ from airborne.io.text import read_csv
 
 ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
 LARGEST = 1e100  # no measurement is larger, and its square is still a number
+_LEAST_TRACKED = 0.5  # as `export.summary.is_mostly_untracked` has it
 _EMPTY = ("", "nan")  # cells without a number
 _FORM = "the table of a batch has columns trial, athlete, condition, status, folder"
 _MEASURED = re.compile(r"-?\d*\.\d{8,}(e[-+]\d+)?")  # chosen: of eight decimals no two recordings have the same
@@ -96,7 +97,12 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
         elif not athlete or not row[CONDITION]:
             left_out.append(f"{row['trial']}: has no label {CONDITION if athlete else ATHLETE}")
         else:
-            trials.append(StudyTrial(row["trial"], athlete, row[CONDITION], _folder_of(folder, row), row))
+            trial = StudyTrial(row["trial"], athlete, row[CONDITION], _folder_of(folder, row), row)
+            share = trial.number("share_tracked")
+            if share is not None and share < _LEAST_TRACKED:
+                left_out.append(f"{trial.name}: only {share:.0%} of its frames are tracked")
+            else:
+                trials.append(trial)
     if not trials and others and not left_out:
         there = ", ".join(dict.fromkeys(others))
         raise ResultError(f"{folder / TABLE}: no trial of condition {' or '.join(conditions)}; it has: {there}")
@@ -108,6 +114,11 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
     if missing:
         raise ResultError(f"{folder / TABLE}: no finished trial of condition {missing[0]}; it has: {', '.join(found)}")
     return Study(tuple(trials), tuple(conditions) or tuple(found), tuple(left_out))
+
+
+def describe_alarms(trials: Sequence[StudyTrial]) -> list[str]:
+    """Name the trials whose runs raised alarms, which are compared all the same."""
+    return [f"{trial.name}: {trial.row['findings']}" for trial in trials if trial.row.get("findings")]
 
 
 def describe_twins(trials: Sequence[StudyTrial]) -> list[str]:

@@ -20,7 +20,7 @@ from airborne.study.curves import require_events
 from airborne.study.figures import write_comparison_figures
 from airborne.study.spm import check_spm1d
 from airborne.study.text import describe_study
-from airborne.study.trials import describe_twins, read_study
+from airborne.study.trials import describe_alarms, describe_twins, read_study
 
 MEANS, DIFFERENCES, CURVES, CLUSTERS = "means.csv", "differences.csv", "curves.csv", "clusters.csv"
 TEXT = "comparison.txt"
@@ -59,8 +59,8 @@ def write_comparison(
     for each, stem in zip(compared, stems, strict=True):
         write_comparison_figures(folder, each, stem)
     text = describe_study(compared, events, real_time=real_time, left_out=study.left_out)
-    if twins := describe_twins(study.trials):
-        text = "\n".join(["Read this first", *twins, "", text])
+    if doubts := [*describe_twins(study.trials), *describe_alarms(study.trials)]:
+        text = "\n".join(["Read this first", *doubts, "", text])
     write_text(folder / TEXT, text)
     return text
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from airborne.tracking.self_check.free_flight import fall, find_wrong_flight
 from airborne.tracking.self_check.solution import Evidence, pose_errors, solve
@@ -148,6 +149,16 @@ def test_a_fall_along_another_axis_than_z_is_named(up):
     found = find_wrong_flight(*turned, known(40))
     assert found is not None and f"towards −{up}, 90° from straight down" in found.sentence
     assert fall(*turned, known(40)) is None
+
+
+@pytest.mark.parametrize(("off_deg", "is_named"), [(2, False), (5, True)])
+def test_a_world_that_is_not_level_is_named(off_deg, is_named):
+    time_s, position, R = thrown(40, 25)
+    world = Rotation.from_euler("x", off_deg, degrees=True).as_matrix()
+    found = find_wrong_flight(time_s, position @ world.T, world @ R, known(40))
+    assert (found is not None) == is_named
+    if found is not None:
+        assert f"{off_deg}° from straight down" in found.sentence
 
 
 def test_a_world_upside_down_is_named():
