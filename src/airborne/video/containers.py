@@ -33,7 +33,13 @@ def open_file(name: str, path: Path | str) -> InputContainer:
     if isinstance(path, str):
         raise VideoError(f"{name}: {path} is an address; give a file, or read cameras on the network with --live")
     if not path.exists():
-        raise VideoError(f"{name}: video {path} not found; check its path")
+        in_braces = "{" in str(path) and "}" in str(path)
+        remedy = (
+            "words in braces are filled in from a trial's labels in session.toml only"
+            if in_braces
+            else "check its path"
+        )
+        raise VideoError(f"{name}: video {path} not found; {remedy}")
     if not path.is_file():
         raise VideoError(f"{name}: {path} is not a file; give a video, or read pipes and devices with --live")
     if path.stat().st_size == 0:

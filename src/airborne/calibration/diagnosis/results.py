@@ -19,6 +19,8 @@ from airborne.cameras.units import check_baselines
 from airborne.types import Array
 
 _UP = np.array([0.0, 0.0, 1.0])  # the world's z
+_OBJECTS = ("board", "wand")  # sources that are found in the images, to a pixel or better
+_MISFIT_TIMES = 3.0  # chosen: a camera that an object fits so many times worse than most
 _MISFIT_PX, _MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the images' longer sides
 
 
@@ -33,6 +35,7 @@ def diagnose(calibration: RigCalibration) -> tuple[Finding, ...]:
         below,
         () if below else check_baselines(rig),  # of a world that is folded over, distances say nothing
         _check_clicks(calibration),
+        _check_objects(calibration),
         check_roll(rig, _UP if is_level else None),
         _check_moved_cameras(calibration),
         _check_links(calibration),
@@ -64,6 +67,25 @@ def _check_clicks(calibration: RigCalibration) -> Iterator[Finding]:
                 what=f"{source.name}: the points fit to {rms_px:.1f} px only, and clicks are good to 1 or 2 px",
                 advice="look for points that are mixed up, a court with another net, or a wrong survey",
             )
+
+
+def _check_objects(calibration: RigCalibration) -> Iterator[Finding]:
+    """Report cameras that a moving board or wand, found to a pixel, fits much worse than it fits most."""
+    adjusted, cameras = calibration.adjustment, calibration.rig.cameras
+    for i, source in enumerate(adjusted.sources):
+        rms_px = np.array([adjusted.rms_px(source=i, camera=c) for c in range(len(cameras))])
+        if source.name not in _OBJECTS or np.isnan(rms_px).all():
+            continue
+        usual_px = float(np.nanmedian(rms_px))
+        for camera, own_px in zip(cameras, rms_px, strict=True):
+            if own_px > max(_MISFIT_PX, _MISFIT_SHARE * max(camera.size), _MISFIT_TIMES * usual_px):
+                yield Finding(
+                    kind="misfit",
+                    what=f"{camera.name}: the {source.name} fits to {own_px:.1f} px only, usual are {usual_px:.1f} px",
+                    advice="its images may be of other moments, as of a video that begins later (airborne sync); else "
+                    "it was moved meanwhile, or its lens is of another kind",
+                    cameras=(camera.name,),
+                )
 
 
 def _tracks(calibration: RigCalibration) -> Iterator[tuple[Array, Array | None]]:
