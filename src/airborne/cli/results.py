@@ -92,7 +92,7 @@ def evaluate_command(
     if (note := note_if_unfinished(results)) is not None:
         print(f"note: {note}")
     if agreement is not None and agreement.doubts:
-        errors.print("airborne: doubt: of a run hardly anything is tracked: see there", style="yellow", markup=False)
+        errors.print("airborne: doubt: less than half of a run is tracked: see there", style="yellow", markup=False)
     if doubtful := [_AGAINST[name] for name, comparison in comparisons.items() if comparison.questions]:
         said = f"what was found {' and '.join(doubtful)} is doubtful: see the question there"
         errors.print(f"airborne: doubt: {said}", style="yellow", markup=False)

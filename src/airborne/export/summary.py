@@ -27,6 +27,8 @@ _REASONS = {
 }
 
 
+MOST_UNTRACKED = 0.5  # chosen: most of what is said of a run of which less is tracked rests on the other frames
+_HARDLY_ANY = 0.1  # chosen: so few of several frames are tracked that a run says nothing
 _MUCH_LATER = 0.02  # chosen: share of a run by which its turns begin later or end earlier, from which on it is said
 
 
@@ -82,12 +84,12 @@ def headline(motion: Motion) -> dict[str, Any]:
 
 def is_mostly_untracked(head: Mapping[str, Any]) -> bool:
     """Whether less than half of a run's frames are tracked, so that nothing can be said of it as a whole."""
-    return bool(head["n_tracked"] < head["n_frames"] / 2)  # chosen: most of what is said rests on the others then
+    return bool(head["n_tracked"] < MOST_UNTRACKED * head["n_frames"])
 
 
 def is_hardly_tracked(head: Mapping[str, Any]) -> bool:
     """Whether of several frames a tenth or less are tracked, so that the run says nothing."""
-    return head["n_frames"] > 1 and bool(head["n_tracked"] <= 0.1 * head["n_frames"])  # chosen
+    return head["n_frames"] > 1 and bool(head["n_tracked"] <= _HARDLY_ANY * head["n_frames"])
 
 
 def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:

@@ -252,7 +252,7 @@ def evaluate_agreement(
 
 
 def _doubt_run(folder: Path) -> str:
-    """Say that hardly anything of the run in a folder can be compared, if that is so."""
+    """Say that less than half of the run in a folder is tracked, if that is so."""
     summary = run_folder.read_summary(folder) if (folder / run_folder.SUMMARY).is_file() else None
     if summary is None or not is_mostly_untracked(summary):
         return ""

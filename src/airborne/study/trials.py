@@ -10,12 +10,12 @@ from pathlib import Path
 from airborne.batch.trials import TABLE
 from airborne.cameras.finding import join_names
 from airborne.errors import ResultError
+from airborne.export.summary import MOST_UNTRACKED
 from airborne.io.names import check_path
 from airborne.io.text import read_csv
 
 ATHLETE, CONDITION = "athlete", "condition"  # the labels that a study needs
 LARGEST = 1e100  # no measurement is larger, and its square is still a number
-_LEAST_TRACKED = 0.5  # as `export.summary.is_mostly_untracked` has it
 _EMPTY = ("", "nan")  # cells without a number
 _FORM = "the table of a batch has columns trial, athlete, condition, status, folder"
 _MEASURED = re.compile(r"-?\d*\.\d{8,}(e[-+]\d+)?")  # chosen: of eight decimals no two recordings have the same
@@ -99,7 +99,7 @@ def read_study(folder: Path, conditions: Sequence[str] = ()) -> Study:
         else:
             trial = StudyTrial(row["trial"], athlete, row[CONDITION], _folder_of(folder, row), row)
             share = trial.number("share_tracked")
-            if share is not None and share < _LEAST_TRACKED:
+            if share is not None and share < MOST_UNTRACKED:
                 left_out.append(f"{trial.name}: only {share:.0%} of its frames are tracked")
             else:
                 trials.append(trial)

@@ -85,5 +85,5 @@ def test_a_shadow_does_not_count(recording, factors, counts):
     column = int(np.median(np.flatnonzero(body[bottom] >= 0)))
     rgb[bottom - 2 : bottom + 20, column - 8 : column + 8] = 200 * np.array(factors)
     shown = foreground(rgb, empty, silhouette)
-    reach = reach_beyond(silhouette, rgb, empty, shown, render_model.segment_of_part)
+    reach = reach_beyond(render_model, silhouette, rgb, empty, shown)
     assert (np.nanmax(reach) > 0.06) == counts

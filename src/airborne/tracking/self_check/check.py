@@ -249,7 +249,7 @@ def _register(
     shown = foreground(rgb, scene, silhouette)
     offset = register(silhouette, shown)
     if render_model.model.has_joints:
-        return offset, reach_beyond(silhouette, rgb, scene, shown, render_model.segment_of_part)
+        return offset, reach_beyond(render_model, silhouette, rgb, scene, shown)
     return offset if offset is None else register_light(silhouette, offset, rgb, scene), None
 
 

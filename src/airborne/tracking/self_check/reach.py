@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from airborne.body import BodyModel
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment, limbs_of
+from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.path import alarm
 from airborne.tracking.self_check.registration import Silhouette, sample_box
 from airborne.types import Array, Image
@@ -24,26 +25,26 @@ _STANDS_OUT = 0.5  # of what `foreground` gives
 # a shadow makes all channels darker by about the same factor, to no less than this share (chosen) [sRGB]
 _DARKEST, _SAME = 0.3, 0.12
 # chosen: of three synthetic people with joints that were set the images went on 27 mm at most, with statures 8 % too
-# small 73 mm, and no joint that was called tracked was over 0.12 m off; of two recorded people 49 mm, and 0.15 m of one
-# whose stature was 8 % too small, without a start, and whose ankles were 0.13 m off
+# small 73 mm, and no joint that was called tracked was over 0.12 m off; of three recorded people 51 mm, and 0.15 m of
+# one whose stature was 8 % too small, without a start, and whose ankles were 0.13 m off
 _LEAST_M = 0.10
 _FEWEST_MOMENTS = 3  # chosen: of which a view's median is taken
 
 
 def reach_beyond(
-    silhouette: Silhouette, rgb: Image, scene: Image, shown: NDArray[np.float32], segment_of_part: NDArray[np.int16]
+    render_model: RenderModel, silhouette: Silhouette, rgb: Image, scene: Image, shown: NDArray[np.float32]
 ) -> Array:
     """Return how far what stands out, connected with the silhouette, reaches beyond each segment: (segments,) [m].
 
     rgb, scene, shown: as `foreground` takes them, and what it gives. NaN for segments that are not seen. Shadows do not
     count.
     """
-    reach = np.full(int(segment_of_part.max()) + 1, np.nan)
+    reach = np.full(len(render_model.model.segments), np.nan)
     covered = silhouette.side >= 0
     stands_out = (shown > _STANDS_OUT) & ~_in_shadow(silhouette, rgb, scene)
     _, label = cv2.connectedComponents((stands_out | covered).astype(np.uint8), connectivity=8)
     beyond = stands_out & ~covered & np.isin(label, np.unique(label[covered]))
-    segment = segment_of_part[silhouette.part]  # where it is covered
+    segment = render_model.segment_of_part[silhouette.part]  # where it is covered
     is_free = (~covered).astype(np.uint8)
     distance_px, labels = cv2.distanceTransformWithLabels(is_free, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     nearest = np.asarray(labels, np.int64)
