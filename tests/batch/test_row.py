@@ -29,7 +29,7 @@ def test_frames_may_be_tracked_where_joints_are_not(tmp_path):
     assert "share_joints_tracked" not in row(tmp_path)
 
 
-@pytest.mark.parametrize(("n", "said"), [(0, "no frame is tracked"), (1, "1 of 10 frames are tracked"), (5, None)])
+@pytest.mark.parametrize(("n", "said"), [(0, "no frame is tracked"), (1, "1 of 10 frames is tracked"), (5, None)])
 def test_a_run_that_is_mostly_untracked_is_an_alarm(tmp_path, n, said):
     found = row(tmp_path, n_tracked=n, n_uncertain=10 - n)
     assert found["n_alarms"] == (said is not None)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from airborne.constants import NORMAL_QUANTILE_975
-from airborne.errors import ResultError
+from airborne.errors import ResultError, count_of
 from airborne.export.summary import is_mostly_untracked
 from airborne.io.text import read_csv
 from airborne.motion.flight.phases import find_flight_events
@@ -66,7 +66,7 @@ def _columns(folder: Path, summary: Mapping[str, Any]) -> TableRow:
     findings = summary.get("self_check") or []
     alarms = [each["sentence"] for each in findings if each["is_alarm"]]
     if is_mostly_untracked(summary):
-        tracked = f"{summary['n_tracked']} of {n} frames are" if summary["n_tracked"] else "no frame is"
+        tracked = count_of(summary["n_tracked"], n, "frame") if summary["n_tracked"] else "no frame is"
         alarms.append(f"{tracked} tracked: look at the overlays and at what the report says of the recording")
     row |= {"n_alarms": len(alarms), "findings": "; ".join(alarms), "n_warnings": len(summary["warnings"])}
     return row | {"version": summary["versions"]["airborne"]}

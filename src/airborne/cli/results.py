@@ -68,7 +68,7 @@ def evaluate_command(
     if of_series or flight or not others:
         comparisons = assess(results, truth, digitised, joints, flight=flight, keep=output is None)
     agreement = None
-    if of_series or others:
+    if of_series or others or operator:
         agreement = evaluate_agreement(
             results,
             truth,

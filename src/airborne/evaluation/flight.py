@@ -12,7 +12,7 @@ import numpy as np
 from airborne.body import BodyModel
 from airborne.errors import ResultError
 from airborne.evaluation.columns import align_columns
-from airborne.evaluation.compare import nan_to_none, or_dash
+from airborne.evaluation.compare import nan_to_none, or_dash, sd_calibration
 from airborne.evaluation.table import read_table
 from airborne.evaluation.times import CLEARLY_BETTER, ELSEWHERE_MM, best_time_shift, match_times, question_shift, span
 from airborne.motion import Motion, state_flight
@@ -169,21 +169,10 @@ def compare_flight(motion: Motion, model: BodyModel, reference: FlightPaths) -> 
         error = error - 360 * np.round(np.nanmedian(error) / 360) if np.isfinite(error).any() else error
         quantities[name] = _errors(error, np.full(len(error), np.nan), "deg")
         if name != "tilt":
-            turns[name] = Turns(measured_rev=_turned(measured), reference_rev=_turned(true[at]))
+            turns[name] = Turns(measured_rev=_revolutions(measured), reference_rev=_revolutions(true[at]))
     if not any(each.n for each in quantities.values()):
         raise ResultError("the reference has no number where the motion has a pose; give the flight of this recording")
-    com_mm, shift_s, shifted_mm = np.nan, 0.0, np.nan
-    if reference.com is not None:
-        true_com = reference.com
-
-        def distance_at(shift_s: float) -> tuple[float, int]:
-            rows, at, _ = match_times(motion.time_s, reference.time_s + shift_s)
-            apart = np.linalg.norm(com[rows] - true_com[at], axis=1)
-            known = apart[np.isfinite(apart)]
-            return (float(1e3 * known.mean()), len(known)) if len(known) else (np.nan, 0)
-
-        com_mm, _ = distance_at(0.0)
-        shift_s, shifted_mm = best_time_shift(reference.time_s, com_mm, distance_at, CLEARLY_BETTER)
+    com_mm, shift_s, shifted_mm = _com_distances(motion.time_s, com, reference)
     return FlightComparison(
         n_frames=len(motion),
         n_reference=len(reference.time_s),
@@ -196,6 +185,22 @@ def compare_flight(motion: Motion, model: BodyModel, reference: FlightPaths) -> 
     )
 
 
+def _com_distances(time_s: Array, com: Array, reference: FlightPaths) -> tuple[float, float, float]:
+    """Return how far apart centres of mass (n, 3) are [mm, mean], the reference's best shift [s], how far with it."""
+    true_com = reference.com
+    if true_com is None:
+        return np.nan, 0.0, np.nan
+
+    def distance_at(shift_s: float) -> tuple[float, int]:
+        rows, at, _ = match_times(time_s, reference.time_s + shift_s)
+        apart = np.linalg.norm(com[rows] - true_com[at], axis=1)
+        known = apart[np.isfinite(apart)]
+        return (float(1e3 * known.mean()), len(known)) if len(known) else (np.nan, 0)
+
+    com_mm, _ = distance_at(0.0)
+    return com_mm, *best_time_shift(reference.time_s, com_mm, distance_at, CLEARLY_BETTER)
+
+
 def _errors(error: Array, sd: Array, unit: str) -> FlightErrors:
     """Reduce errors (n,) with their stated sds (n,), NaN where not known."""
     sd, error = sd[np.isfinite(error)], error[np.isfinite(error)]
@@ -203,7 +208,6 @@ def _errors(error: Array, sd: Array, unit: str) -> FlightErrors:
         return FlightErrors(
             unit=unit, n=0, rms=np.nan, largest=np.nan, bias=np.nan, rms_without_bias=np.nan, within_2sd=np.nan
         )
-    is_stated = np.isfinite(sd)
     return FlightErrors(
         unit=unit,
         n=len(error),
@@ -211,10 +215,10 @@ def _errors(error: Array, sd: Array, unit: str) -> FlightErrors:
         largest=float(np.abs(error).max()),
         bias=float(error.mean()),
         rms_without_bias=float(error.std()),
-        within_2sd=float(np.mean(np.abs(error[is_stated]) <= 2 * sd[is_stated])) if is_stated.any() else np.nan,
+        within_2sd=sd_calibration(error, sd).within_2sd,
     )
 
 
-def _turned(angle_deg: Array) -> float:
+def _revolutions(angle_deg: Array) -> float:
     known = angle_deg[np.isfinite(angle_deg)]
     return float((known[-1] - known[0]) / 360) if len(known) else np.nan

@@ -161,6 +161,13 @@ def test_a_world_that_is_not_level_is_named(off_deg, is_named):
         assert f"{off_deg}° from straight down" in found.sentence
 
 
+def test_a_wrong_rate_is_named_in_a_world_that_is_not_level_too():
+    time_s, position, R = thrown(40, 12.5)
+    world = Rotation.from_euler("x", 5, degrees=True).as_matrix()
+    found = find_wrong_flight(time_s, position @ world.T, world @ R, known(40))
+    assert found is not None and "0.50 of that" in found.sentence
+
+
 def test_a_world_upside_down_is_named():
     time_s, position, R = thrown(40, 25)
     found = find_wrong_flight(time_s, -position, R, known(40))

@@ -50,8 +50,7 @@ class _Parabola(NamedTuple):
     @property
     def is_vertical(self) -> bool:
         """Whether it falls along the world's z axis, downward."""
-        x, y, z = self.acceleration
-        return z < 0 and np.hypot(x, y) < _MOST_TILT * -z
+        return self.tilt < np.arctan(_MOST_TILT)
 
     @property
     def tilt(self) -> float:
@@ -83,8 +82,9 @@ def find_wrong_flight(time_s: Array, position: Array, R: Array, covariance: Arra
         return None
     if not found.is_vertical:
         return _wrong_vertical(found)
-    if found.tilt > max(_LEAST_TILTED, _TILTED_SDS * found.sd_m_s2 / GRAVITY_M_S2):
-        return _wrong_vertical(found)
+    is_tilted = found.tilt > max(_LEAST_TILTED, _TILTED_SDS * found.sd_m_s2 / GRAVITY_M_S2)
+    if is_tilted and (wrong := _wrong_vertical(found)) is not None:
+        return wrong
     falls = float(-found.acceleration[2])
     if not _SLOWEST_M_S2 < falls < _FASTEST_M_S2 or _LEAST_M_S2 < falls < _MOST_M_S2:
         return None

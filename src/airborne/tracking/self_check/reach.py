@@ -21,9 +21,8 @@ from airborne.tracking.self_check.path import alarm
 from airborne.tracking.self_check.registration import Silhouette, sample_box
 from airborne.types import Array, Image
 
-_STANDS_OUT = 0.5  # of what `foreground` gives
-# a shadow makes all channels darker by about the same factor, to no less than this share (chosen) [sRGB]
-_DARKEST, _SAME = 0.3, 0.12
+_STANDS_OUT = 0.5  # chosen: of what `foreground` gives, from 0 to 1
+_DARKEST, _SAME = 0.3, 0.12  # chosen: to what share a shadow darkens an sRGB level, at least; how alike all channels
 # chosen: of three synthetic people with joints that were set the images went on 27 mm at most, with statures 8 % too
 # small 73 mm, and no joint that was called tracked was over 0.12 m off; of three recorded people 51 mm, and 0.15 m of
 # one whose stature was 8 % too small, without a start, and whose ankles were 0.13 m off
@@ -94,15 +93,16 @@ def find_far_reach(model: BodyModel, reach: Array) -> FarReach | None:
 
     Two cameras must show it, where there are two. Of the head nothing is said: hair may hang down.
     """
-    n_cameras = reach.shape[1]
-    by_view = np.array([[_usual(reach[:, view, k]) for view in range(n_cameras)] for k in range(reach.shape[2])])
-    second = np.sort(np.nan_to_num(by_view), axis=1)[:, -min(2, n_cameras)]
-    ends = [int(limb[-1]) for limb in limbs_of(model) if second[limb[-1]] > _LEAST_M]
+    n_cameras, ends = reach.shape[1], [int(limb[-1]) for limb in limbs_of(model)]
     if not ends:
         return None
-    most = max(ends, key=lambda k: second[k])
+    by_view = np.array([[_usual(reach[:, view, end]) for view in range(n_cameras)] for end in ends])
+    second = np.sort(np.nan_to_num(by_view), axis=1)[:, -min(2, n_cameras)]
+    most = int(np.argmax(second))
+    if second[most] <= _LEAST_M:
+        return None
     seen = by_view[most][np.isfinite(by_view[most])]
-    names = tuple(model.segments[k].name for k in ends)
+    names = tuple(model.segments[end].name for end, far in zip(ends, second, strict=True) if far > _LEAST_M)
     return FarReach(names, float(second[most]), float(np.std(seen)), int(np.sum(seen > _LEAST_M)), n_cameras)
 
 

@@ -20,7 +20,7 @@ from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.offset_equations import foreground_equations
 from airborne.types import Array
 
-_SIDES = 27  # that a part may face: along each of its axes forward, back or neither
+_SIDES = 3**3  # that a part may face: along each of its axes forward, back or neither
 N_SIMILARITY = 4  # shift right, shift down [px], turn clockwise [rad], log scale, about the silhouette's middle
 _LONGEST_PX = 220  # images are reduced until the silhouette is no longer
 _SHORTEST_PX = 16  # a smaller silhouette is not registered
