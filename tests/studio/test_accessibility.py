@@ -22,6 +22,10 @@ IS_STILL = "!document.querySelector('.q-notification')"  # those fade in and out
 END_ANIMATIONS = """Promise.allSettled(document.getAnimations().map(
     async (each) => each.effect.getComputedTiming().endTime < Infinity ? each.finish() : each.finished
 ))"""
+MOVING = """() => [...document.querySelectorAll("*")].filter((each) => {
+    const style = getComputedStyle(each);
+    return parseFloat(style.transitionDuration) || parseFloat(style.animationDuration);
+}).length"""
 ARE_LOADED = "[...document.querySelectorAll('[role=dialog] img')].every((each) => each.naturalWidth)"
 PAGES = {  # and what is there when a page is built
     "": "Use these cameras", "sync": "Same event", "cameras": "focal length", "body": "Use this person",
@@ -71,6 +75,7 @@ def found(folder):
     def look(page, name):
         page.wait_for_function(IS_STILL)
         page.evaluate(END_ANIMATIONS)
+        assert page.evaluate(MOVING) == 0, "for who asks for less motion nothing moves"
         found[name] = (None if axe is None else violations(axe, page)), faults_by_size(page)
 
     with fork_studio(folder) as address, open_page(address) as page:

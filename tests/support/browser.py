@@ -84,7 +84,7 @@ def _fresh_context() -> Iterator:
         _launch.cache_clear()
         chromium, loop = _launch(program)
     asyncio._set_running_loop(loop)
-    context = chromium.new_context(viewport=SIZE)
+    context = chromium.new_context(viewport=SIZE, reduced_motion="reduce")  # nothing is waited for that fades
     try:
         yield context
     finally:
