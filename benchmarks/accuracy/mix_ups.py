@@ -42,8 +42,9 @@ def moments_of(scene: Scene) -> list[Moment]:
 
 
 def with_mix_up(moments: Sequence[Moment], mix_up: MixUp) -> list[Moment]:
-    """Return the moments as they are with a mix-up, which is undone as it is made."""
-    return [replace(moment, evidence=tuple(mix_up.undo_in(moment.evidence))) for moment in moments]
+    """Return the moments as they are with a mix-up, which is made as one the other way round is undone."""
+    other = replace(mix_up, cameras=mix_up.cameras[::-1])
+    return [replace(moment, evidence=tuple(other.undo_in(moment.evidence))) for moment in moments]
 
 
 def with_turned(moments: Sequence[Moment], number: int, seed: int) -> list[Moment]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airborne.run.mix_ups import mix_ups_in
+from airborne.run.mix_ups import MixUp, mix_ups_in, possible_mix_ups
 
 NAMES = ("left", "middle", "right")
 
@@ -31,6 +31,25 @@ def test_two_exchanged_videos_are_named(a, b):
     images = list(IMAGES)
     images[a], images[b] = images[b], images[a]
     assert kinds(images) == [("swapped", (NAMES[a], NAMES[b]))]
+
+
+@pytest.mark.parametrize("cameras", [(0, 1, 2), (2, 1, 0)])
+def test_three_videos_in_a_wrong_order_are_named_with_the_right_one(cameras):
+    images = list(IMAGES)
+    for camera, source in MixUp(cameras).order:
+        images[source] = IMAGES[camera]
+    (finding,) = mix_ups_in(NAMES, images, SILHOUETTES)
+    assert (finding.kind, set(finding.cameras)) == ("swapped", set(NAMES))
+    right = {source: camera for camera, source in MixUp(cameras).order}
+    for name, camera in zip(NAMES, map(right.get, range(3)), strict=True):
+        assert f"{name} as {NAMES[camera]}" in finding.sentence
+
+
+@pytest.mark.parametrize(("n", "n_orders"), [(2, 1), (3, 3 + 2), (4, 6 + 2 * 4 + 2), (8, 28 + 2)])
+def test_orders_that_are_tried_stay_few_with_many_cameras(n, n_orders):
+    orders = {tuple(mix_up.undo_in(range(n))) for mix_up in possible_mix_ups(n) if mix_up.is_exchange}
+    assert len(orders) == n_orders
+    assert tuple(range(n)) not in orders
 
 
 @pytest.mark.parametrize("i", [0, 1, 2])

@@ -51,8 +51,9 @@ RIGHT = moments()
 
 
 def mixed(mix_up):
-    """The moments as they are with a mix-up, which is undone as it is made."""
-    return [replace(moment, evidence=tuple(mix_up.undo_in(moment.evidence))) for moment in RIGHT]
+    """The moments as they are with a mix-up, which is made as one the other way round is undone."""
+    other = replace(mix_up, cameras=mix_up.cameras[::-1])
+    return [replace(moment, evidence=tuple(other.undo_in(moment.evidence))) for moment in RIGHT]
 
 
 def test_videos_of_their_own_cameras_show_one_body():

@@ -79,6 +79,13 @@ def test_two_exchanged_videos_are_named(alone, n, i, j):
     assert found(starts, frames) == ("swapped", (NAMES[i], NAMES[j]))
 
 
+@pytest.mark.parametrize("cameras", [(0, 1, 2), (2, 1, 0)])
+def test_three_videos_in_a_wrong_order_are_named(alone, cameras):
+    starts, first = alone
+    frames = MixUp(cameras[::-1]).undo(only(first, 3))
+    assert found(starts, frames) == ("swapped", tuple(NAMES[i] for i in cameras))
+
+
 @pytest.mark.parametrize(("n", "i"), [(3, 0), (3, 2), (2, 1)])
 def test_a_mirrored_video_is_named(alone, n, i):
     starts, first = alone

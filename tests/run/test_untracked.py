@@ -128,14 +128,14 @@ def test_an_exchange_is_tried_where_each_image_agrees_with_both_silhouettes():
     assert find_undecided_mix_ups(RIG, right, CROSS, SCENE.start()) == []
 
 
-def test_what_is_undone_twice_is_as_before():
+def test_what_is_undone_both_ways_round_is_as_before():
     for mix_up in possible_mix_ups(len(NAMES)):
         once = mix_up.undo(SCENE.frames(0))
-        twice = mix_up.undo(once)
+        twice = replace(mix_up, cameras=mix_up.cameras[::-1]).undo(once)
         for before, between, after in zip(SCENE.frames(0).views, once.views, twice.views, strict=True):
             assert (before.rgb == after.rgb).all() and before.camera is between.camera is after.camera
         changed = [i for i, view in enumerate(once.views) if (view.rgb != SCENE.frames(0).views[i].rgb).any()]
-        assert tuple(changed) == mix_up.cameras
+        assert tuple(changed) == tuple(sorted(mix_up.cameras))
 
 
 def test_a_mix_up_with_a_camera_without_an_image_is_not_undone():

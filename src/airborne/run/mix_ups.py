@@ -1,8 +1,8 @@
-"""Mix-ups of a trial's videos, before anything is tracked: the same file twice, exchanged, mirrored, upside down.
+"""Mix-ups of a trial's videos, before anything is tracked: one twice, in a wrong order, mirrored, upside down.
 
 At the start, each video's foreground, what is not in its median image, is compared with the body's silhouette in every
-camera: exchanged files agree with each other's cameras, a mirrored image, or one that stands upside down, with its own
-camera's silhouette once it is mirrored or turned by 180 degrees.
+camera: files in a wrong order agree with each other's cameras, a mirrored image, or one that stands upside down, with
+its own camera's silhouette once it is mirrored or turned by 180 degrees.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ _LEAST_AGREEMENT = 0.4  # of a silhouette in the right camera, from which on som
 # mean agreement of all cameras without the mix-ups, at least. Chosen on synthetic throws and somersaults: of 48 mix-ups
 # 0.65 to 0.83; of the 16 that 2700 starts at wrong places, by 0.05 to 2 m, had looked like, 0.12 to 0.47
 _LEAST_EXPLAINED = 0.55
+_MOST_CAMERAS = 4  # chosen: whose videos are tried three by three in a wrong order; of eight there were 112 such orders
 _MOST_OF_IT = 0.5  # share of that agreement which a camera given the wrong images has left, at most
 
 
@@ -106,26 +107,37 @@ def _agreements_without(
 
 @dataclass(frozen=True, slots=True)
 class MixUp:
-    """Two cameras' videos exchanged, or one's images mirrored, or upside down: by their places in the rig."""
+    """Cameras' videos in a wrong order, or one's images mirrored, or upside down: by their places in the rig."""
 
-    cameras: tuple[int, ...]
+    cameras: tuple[int, ...]  # of several, each one's images are in the video of the next, the last one's in the first
     is_turned: bool = False  # one camera's images, by 180 degrees
 
     @property
     def is_exchange(self) -> bool:
-        """Whether two cameras' videos are exchanged."""
-        return len(self.cameras) == 2
+        """Whether videos are exchanged, of two cameras or of more."""
+        return len(self.cameras) > 1
 
     def describe(self, names: Sequence[str]) -> str:
         """Return how its images would be right, by the rig's names."""
+        if len(self.cameras) > 2:
+            return f"the images of {self._describe_order(names)}"
         of = join_names([names[i] for i in self.cameras])
         return f"the images of {of} {'exchanged' if self.is_exchange else self._remedy}"
 
     def how(self, names: Sequence[str]) -> str:
         """Return how the first of its cameras agrees, by the rig's names."""
         if self.is_exchange:
-            return f"in that of {names[self.cameras[1]]}, whose video fits in turn"
+            in_turn = "whose video fits in turn" if len(self.cameras) == 2 else "and so on"
+            return f"in that of {names[self.cameras[1]]}, {in_turn}"
         return f"once it is {self._remedy}"
+
+    @property
+    def order(self) -> list[tuple[int, int]]:
+        """Each of its cameras with the one whose video shows what it saw."""
+        return list(zip(self.cameras, (*self.cameras[1:], self.cameras[0]), strict=True))
+
+    def _describe_order(self, names: Sequence[str]) -> str:
+        return join_names([f"{names[source]} as {names[camera]}" for camera, source in self.order])
 
     @property
     def _remedy(self) -> str:
@@ -138,7 +150,7 @@ class MixUp:
     def undo_images(self, images: Sequence[Mask | None]) -> list[Mask | None]:
         """Return the images of its cameras as they would be without it, of those of all cameras."""
         if self.is_exchange:
-            return [images[i] for i in reversed(self.cameras)]
+            return [images[source] for _, source in self.order]
         return [None if (image := images[i]) is None else self._flip(image) for i in self.cameras]
 
     def undo_in(self, images: Sequence[Mask | None]) -> list[Mask | None]:
@@ -150,7 +162,7 @@ class MixUp:
 
     def undo(self, frames: Frames) -> Frames | None:
         """Return frames with the images as they would be without it; None where one is missing or does not fit."""
-        views, sources = list(frames.views), [frames.views[i] for i in reversed(self.cameras)]
+        views, sources = list(frames.views), [frames.views[source] for _, source in self.order]
         for i, source in zip(self.cameras, sources, strict=True):
             view = frames.views[i]
             if view is None or source is None or view.camera.size != source.camera.size:
@@ -162,8 +174,10 @@ class MixUp:
         """Return it as a finding, by the rig's names; `what` shows it."""
         cameras = tuple(names[i] for i in self.cameras)
         if self.is_exchange:
-            both = join_names(cameras)
-            advice = f"the videos of {both}, or their calibrations, are exchanged; exchange them back"
+            of = f"the videos of {join_names(cameras)}, or their calibrations, are"
+            advice = f"{of} exchanged; exchange them back"
+            if len(cameras) > 2:
+                advice = f"{of} in a wrong order; use that of {self._describe_order(names)}"
             return Finding(kind="swapped", what=what, advice=advice, cameras=cameras)
         if self.is_turned:
             advice = f"the images of {cameras[0]} stand upside down; write its video anew, turned by 180°"
@@ -176,9 +190,14 @@ class MixUp:
 
 
 def possible_mix_ups(n_cameras: int) -> list[MixUp]:
-    """Return what can be mixed up: each two cameras' videos, and each camera's images, mirrored or upside down."""
-    exchanged, alone = (list(combinations(range(n_cameras), n)) for n in (2, 1))
-    return [*map(MixUp, exchanged), *map(MixUp, alone), *(MixUp(camera, is_turned=True) for camera in alone)]
+    """Return what can be mixed up: the videos of two cameras, three or all, each one's images, mirrored or upside down.
+
+    Three and all are mixed up in turn: each camera has the video of the next, or of the one before.
+    """
+    alone, exchanged, of_three = (list(combinations(range(n_cameras), n)) for n in (1, 2, 3))
+    in_turn = of_three * (n_cameras <= _MOST_CAMERAS) + [tuple(range(n_cameras))] * (n_cameras > 3)
+    in_turn = [each for cameras in in_turn for each in (cameras, cameras[::-1])]
+    return [*map(MixUp, exchanged + in_turn), *map(MixUp, alone), *(MixUp(camera, is_turned=True) for camera in alone)]
 
 
 def find_undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyModel, start: Pose) -> list[MixUp]:

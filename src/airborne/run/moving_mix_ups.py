@@ -140,13 +140,11 @@ def _count(regions: _Regions) -> int:
 
 def _undo(mix_up: MixUp, cameras: Sequence[Camera], regions: _Regions) -> _Regions:
     """Return the regions as they would be without a mix-up."""
-    i, j = mix_up.cameras[0], mix_up.cameras[-1]
-    right = list(regions)
+    i, right = mix_up.cameras[0], list(regions)
     if mix_up.is_exchange:
-        right[i], right[j] = (
-            None if (region := regions[source]) is None else replace(region, camera=cameras[target])
-            for target, source in ((i, j), (j, i))
-        )
+        for target, source in mix_up.order:
+            region = regions[source]
+            right[target] = None if region is None else replace(region, camera=cameras[target])
     elif (region := regions[i]) is not None:
         flipped = np.array(cameras[i].size) - region.mask.shape[::-1] - region.corner
         centre = np.array(cameras[i].size) - 1 - region.centre
