@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]  # images, maps and tables
+Floats = NDArray[np.floating]  # of either precision
 Ints = NDArray[np.integer]
 Mask = NDArray[np.bool_]
 Image = NDArray[np.uint8]  # (h, w, 3) sRGB, or (h, w) grey

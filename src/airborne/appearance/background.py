@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.kernels import kernel
+from airborne.types import Array32
 
 START_SD = 6.0  # [grey levels] of a pixel that was observed once
 TILE_PX = 128  # chosen: side of the tiles that a learned background shares with the one before
@@ -19,12 +20,12 @@ _MIN_RATE = 0.05  # least weight of a pixel's newest observation, so that slow c
 class BackgroundPixels(NamedTuple):
     """What is known of the background of some pixels [sRGB grey levels]."""
 
-    mean: NDArray[np.float32]  # (h, w, 3)
-    sd: NDArray[np.float32]  # (h, w)
-    n_observations: NDArray[np.float32]  # (h, w)
+    mean: Array32  # (h, w, 3)
+    sd: Array32  # (h, w)
+    n_observations: Array32  # (h, w)
 
 
-_Tile = NDArray[np.float32]  # (h, w, 5): a pixel's mean (3), sd, number of observations, in one array to be copied fast
+_Tile = Array32  # (h, w, 5): a pixel's mean (3), sd, number of observations, in one array to be copied fast
 _Slices = tuple[slice, slice]
 _UNKNOWN: _Tile = np.zeros((TILE_PX, TILE_PX, 5), np.float32)
 _UNKNOWN[..., 3] = START_SD

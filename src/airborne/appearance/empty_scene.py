@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from airborne.geometry.robust import SD_OF_MEDIAN_DEVIATION
 from airborne.kernels import kernel
-from airborne.types import Image
+from airborne.types import Array32, Image
 
 FEWEST_PICTURES = 5  # with fewer, a median is no empty scene
 _DARKEST = np.float32(0.35)  # shadow, of the background's light
@@ -28,10 +28,10 @@ _BLUR_PX = 0.8  # sd of the blur of differences
 class EmptyScene:
     """What one camera sees where nothing moves."""
 
-    rgb: NDArray[np.float32]  # (h, w, 3) median [sRGB grey levels]
-    sd: NDArray[np.float32]  # (h, w) of the largest channel difference of a picture from it [grey levels]
+    rgb: Array32  # (h, w, 3) median [sRGB grey levels]
+    sd: Array32  # (h, w) of the largest channel difference of a picture from it [grey levels]
 
-    def evidence(self, rgb: Image) -> NDArray[np.float32]:
+    def evidence(self, rgb: Image) -> Array32:
         """Return each pixel's evidence to show something else (h, w): a log-likelihood ratio [nats], bounded.
 
         Differences are half-normal where the scene is empty, uniform over 128 grey levels where it is not.
@@ -52,7 +52,7 @@ def estimate_empty_scene(pictures: Sequence[Image]) -> EmptyScene:
     return EmptyScene(median, np.asarray(sd, np.float32))
 
 
-def difference(image: NDArray[np.uint8], background: NDArray[np.float32]) -> NDArray[np.float32]:
+def difference(image: NDArray[np.uint8], background: Array32) -> Array32:
     """Return how far pixels differ from the background (h, w) [grey levels]; where it is only darker, by hue alone."""
     out = np.empty(image.shape[:2], np.float32)
     _fill_difference(image, background, out)

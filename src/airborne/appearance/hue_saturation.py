@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.kernels import kernel
+from airborne.types import Array32
 
 HSV_BINS = 110  # 10 hues x 10 saturations, and 10 values of what has no colour (Pérez et al. 2002)
 OUTSIDE = HSV_BINS  # the bin of what no image shows
@@ -55,7 +56,7 @@ def look_up(rgb, table):
     return codes
 
 
-def root_histograms(counts: NDArray) -> NDArray[np.float32]:
+def root_histograms(counts: NDArray) -> Array32:
     """Return the square roots of histograms (..., bins) scaled to sum 1; zeros where nothing was counted."""
     counts = np.asarray(counts, float)
     total = counts.sum(axis=-1, keepdims=True)

@@ -12,7 +12,7 @@ from airborne.kernels import kernel
 from airborne.kernels.arrays import solve_positive
 from airborne.rendering.srgb import light_from_srgb
 
-LIGHT_FROM_SRGB = light_from_srgb(np.arange(1024) * (255 / 1023)).astype(np.float32)
+LIGHT_FROM_SRGB = light_from_srgb(np.arange(1024.0) * (255 / 1023)).astype(np.float32)
 _RIDGE = 1e-4  # of the direction-dependent part toward zero, per pixel of unit albedo
 LIGHT_TERMS = 6  # ambient light, normal (3), image coordinates (2)
 _MOST_SAMPLES = 300  # pixels of a face from which its light is fitted

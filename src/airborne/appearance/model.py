@@ -13,6 +13,7 @@ from airborne.appearance.background import BackgroundModel, BackgroundPixels, Fi
 from airborne.appearance.brightness import brightness_ratios, divide_brightness
 from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, posterior
 from airborne.cameras import Camera
+from airborne.types import Array32
 from airborne.video import View
 
 # sds of a lens's blur that are told apart: the widest is what the nine taps of the comparison's blur just hold
@@ -46,7 +47,7 @@ class Region:
         return whole[y0 : y0 + height, x0 : x0 + width]
 
 
-Histograms = Mapping[str, NDArray[np.float32]]  # camera name -> (32, 32, 32) probabilities
+Histograms = Mapping[str, Array32]  # camera name -> (32, 32, 32) probabilities
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +121,7 @@ class Appearance:
         ratios = brightness_ratios(region.rgb, self.backgrounds[region.source], region.corner)
         return region if ratios is None else replace(region, rgb=divide_brightness(region.rgb, ratios))
 
-    def posterior(self, region: Region) -> NDArray[np.float32]:
+    def posterior(self, region: Region) -> Array32:
         """Return each pixel's probability (h, w) to be body, at even odds."""
         out = np.empty(region.rgb.shape[:2], np.float32)
         name = region.camera.name

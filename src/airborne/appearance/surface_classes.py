@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from airborne.appearance.foreground import BINS_PER_CHANNEL
 from airborne.kernels import kernel
+from airborne.types import Array32
 
 TABLE_COLUMNS = 8  # room for the classes, a whole number of cache lines
 _FLOOR = 1e-6  # probability of a bin that was never observed
 _SHARED_COLOURS = 0.8  # share of what anyone wears that has the player's own colours
 
 
-def log_ratio_table(classes: NDArray, background: NDArray, occlusion: NDArray) -> NDArray[np.float32]:
+def log_ratio_table(classes: NDArray, background: NDArray, occlusion: NDArray) -> Array32:
     """Return the table (32768, TABLE_COLUMNS) of evidence [nats]; classes (k, 32, 32, 32) are colour probabilities.
 
     background (32, 32, 32) likewise, occlusion (k,) the probability that somebody else covers a pixel of that class.

@@ -142,7 +142,7 @@ def find_borders(model: BodyModel, views: Sequence[PosedView]) -> dict[str, Bord
             for axis in axes[name]:
                 start, end = extent_m(model, name, axis)
                 profiles[stem_of(name), axis].add(
-                    (local[:, axis] - start) / (end - start), region.rgb[rows, columns] * 1.0
+                    (local[:, axis] - start) / (end - start), region.rgb[rows, columns].astype(float)
                 )
     borders: dict[str, Border | None] = {stem_of(name): None for name in axes}
     best = dict.fromkeys(borders, 0.0)

@@ -21,7 +21,7 @@ from airborne.tracking.model_based.blur import blur_planes, gaussian_taps
 from airborne.tracking.model_based.owners import REACH_PX, find_owners
 from airborne.tracking.model_based.render_model import RenderModel, ViewBuffers
 from airborne.tracking.model_based.twist_equations import BLOCK_PX
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _SIGMA_PX = 1.2  # of the blur
 _SCALE_LIGHT = 0.1  # linear light, 0..1, of the robust cost: a residual this large has a quarter of the weight
@@ -113,7 +113,7 @@ def _fit_light(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -
     fit_light(view.observation.observed, *of_body, view.light, _LIGHT_ROUNDS, 0, 0, width, height)
 
 
-def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> NDArray[np.float32]:
+def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> Array32:
     """Composite the body over the scene under the view's light: (3, h, w) linear light."""
     part, _, normals = view.maps
     surface_maps(render_model.shapes, render_model.geometry, posed.R, posed.t, view.packed_view, *view.maps)
@@ -122,13 +122,13 @@ def _compose(render_model: RenderModel, posed: PosedBody, view: ViewBuffers) -> 
     return np.where(part >= 0, lit, view.observation.background)
 
 
-def _residual(view: ViewBuffers, composite: NDArray[np.float32]) -> NDArray[np.float32]:
+def _residual(view: ViewBuffers, composite: Array32) -> Array32:
     out = np.empty_like(composite)
     blur_planes(view.observation.observed - composite, *_taps(view), out)
     return out
 
 
-def _weigh(view: ViewBuffers, residual: NDArray[np.float32]) -> tuple[Misfit, NDArray[np.float32]]:
+def _weigh(view: ViewBuffers, residual: Array32) -> tuple[Misfit, Array32]:
     """Return the misfit and each pixel's weight (h, w), with the body already in the view's maps."""
     certainty, covered = view.observation.certainty, view.maps.part >= 0
     e2 = np.einsum("khw,khw->hw", residual, residual)

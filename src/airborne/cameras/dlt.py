@@ -74,7 +74,7 @@ def decompose(P: Array) -> Decomposition:
     rows = np.stack([(P[0, :3] - u0 * r3) / f_u, (P[1, :3] - v0 * r3) / f_v, r3])
     left, _, right = np.linalg.svd(rows)
     K = np.array([[f_u, 0, u0], [0, f_v, v0], [0, 0, 1]])
-    return Decomposition(K, left @ right, -np.linalg.solve(P[:, :3], P[:, 3]))
+    return Decomposition(K, left @ right, np.asarray(-np.linalg.solve(P[:, :3], P[:, 3]), float))
 
 
 def decompose_with_skew(P: Array) -> Decomposition:
@@ -90,4 +90,4 @@ def decompose_with_skew(P: Array) -> Decomposition:
     skew = right @ r2
     r1 = np.cross(r2, r3)
     K = np.array([[right @ r1, skew, u0], [0, np.linalg.norm(down), v0], [0, 0, 1]])
-    return Decomposition(K, np.stack([r1, r2, r3]), -np.linalg.solve(P[:, :3], P[:, 3]))
+    return Decomposition(K, np.stack([r1, r2, r3]), np.asarray(-np.linalg.solve(P[:, :3], P[:, 3]), float))

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne import __version__
 from airborne.errors import ResultError
 from airborne.export.takes import Take
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 LARGEST_RESIDUAL_MM = 100.0  # larger ones, and infinite ones, are written as this
 # bytes of a block, the processor code of Intel, the key of a C3D file (C3D format manual)
@@ -60,7 +59,7 @@ def _scale_mm(points_mm: Array, sd_mm: Array) -> float:
     return float(np.float32(max(largest / _LARGEST_INTEGER, spread / 255)))
 
 
-def _data(points_mm: Array, sd_mm: Array, scale_mm: float) -> NDArray[np.float32]:
+def _data(points_mm: Array, sd_mm: Array, scale_mm: float) -> Array32:
     """Lay out (n, markers, 4): x, y, z and the fourth word, whose low byte is the residual; its cameras are unknown."""
     is_known = np.isfinite(points_mm).all(axis=-1)
     steps = np.clip(np.rint(np.nan_to_num(sd_mm, nan=0.0, posinf=np.inf) / scale_mm), 1, 255)

@@ -77,7 +77,7 @@ class BandedEquations:
             covariance = inverse + gain @ covariance @ gain.T
             found.append(covariance)
         diagonal = [each[j : j + d, j : j + d] for each in found[::-1] for j in range(0, len(each), d)]
-        return np.array(diagonal)
+        return np.array(diagonal, float)
 
     def _join(self, rows: range, columns: range) -> Array:
         """Return the part of A of some times, rows and columns."""

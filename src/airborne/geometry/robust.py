@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airborne.types import Array
+from airborne.types import Array, Floats
 
 SD_OF_MEDIAN_DEVIATION = 1.4826  # of normal noise: 1 / 0.67449, its 75 % quantile
 
@@ -14,7 +14,7 @@ def robust_sd(values: Array) -> float:
     return SD_OF_MEDIAN_DEVIATION * float(np.median(np.abs(values - np.median(values))))
 
 
-def known_median(values: Array) -> Array:
+def known_median(values: Floats) -> Array:
     """Return the median over the first axis of what is not NaN; NaN where nothing is.
 
     As `np.nanmedian`, which takes twenty times as long where rows are few and columns many.

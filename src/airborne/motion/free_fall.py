@@ -93,7 +93,7 @@ def combine_sides(first: SideLikelihood, second: SideLikelihood) -> tuple[Array,
     """Combine both sides: log-likelihood of (take-off, landing) (i, j), the parabola's mean (i, j, 2), covariance."""
     information_vector = first.information_vector[:, None] + second.information_vector
     precision = first.precision[:, None] + second.precision
-    covariance = np.linalg.inv(precision)
+    covariance = np.asarray(np.linalg.inv(precision), float)
     mean = (covariance @ information_vector[..., None])[..., 0]
     fit = 0.5 * (information_vector * mean).sum(axis=-1) - 0.5 * np.linalg.slogdet(precision)[1]
     return first.constant[:, None] + second.constant + fit, mean, covariance

@@ -20,7 +20,7 @@ from airborne.rendering.reduction import reduce_camera, reduce_image
 from airborne.rendering.shapes import new_shapes, outline_all, pose_shapes
 from airborne.rendering.spans import shown_rows, sort_runs
 from airborne.rendering.threads import in_threads
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +29,11 @@ class EvidenceMaps:
 
     views: NDArray[np.float64]  # (v, 18) packed cameras
     sizes: NDArray[np.int64]  # (v, 3) pixels a row, rows, offset in `sums`
-    sums: NDArray[np.float32]  # row by row, pixels + 1 sums from the row's start
+    sums: Array32  # row by row, pixels + 1 sums from the row's start
     totals: NDArray[np.float64]  # (v,) sum over the whole view
 
 
-def evidence_maps(cameras: Sequence[Camera], maps: Sequence[Array], *, scale: int = 1) -> EvidenceMaps:
+def evidence_maps(cameras: Sequence[Camera], maps: Sequence[Array32], *, scale: int = 1) -> EvidenceMaps:
     """Sum the maps (h, w) of the cameras' images, reduced `scale` times by averaging; a reduced pixel counts once."""
     small_maps = [reduce_image(np.asarray(plane, np.float32), scale) for plane in maps]
     small_cameras = [reduce_camera(camera, scale) for camera in cameras]

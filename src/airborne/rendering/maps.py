@@ -26,14 +26,15 @@ from airborne.rendering.rows import (
 )
 from airborne.rendering.shapes import B_1, B_U, B_V, VIEW_K, pose_shapes
 from airborne.rendering.spans import list_spans
+from airborne.types import Array32
 
 
 class SurfaceMaps(NamedTuple):
     """What each pixel of a view shows; see `surface_maps`."""
 
     part: NDArray[np.int16]  # (h, w)
-    inverse_depth: NDArray[np.float32]  # (h, w) [1/m]
-    normals: NDArray[np.float32]  # (3, h, w); (3, 0, 0) where they are not asked for
+    inverse_depth: Array32  # (h, w) [1/m]
+    normals: Array32  # (3, h, w); (3, 0, 0) where they are not asked for
 
 
 def empty_maps(size: tuple[int, int], *, with_normals: bool = True) -> SurfaceMaps:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from airborne.cameras import Camera
 from airborne.errors import CalibrationError
 from airborne.rendering.lights import Lights
+from airborne.types import Array32
 
 _NO_CONE = -2.0  # below every cosine
 
@@ -48,7 +49,7 @@ def reduce_view(view: NDArray, scale: tuple[int, int]) -> NDArray:
 
 
 @lru_cache(maxsize=256)
-def pack_lights(lights: Lights, camera: Camera, *, transposed: bool = False) -> NDArray[np.float32]:
+def pack_lights(lights: Lights, camera: Camera, *, transposed: bool = False) -> Array32:
     """Pack the lamps for one camera: position, intensity, axis, cosine of the half angle, in camera axes: (l, 8)."""
     order = [1, 0, 2] if transposed else [0, 1, 2]
     to_camera = camera.camera_from_world.as_matrix()  # on single points, SciPy's own methods take ten times as long

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras import Camera
+from airborne.types import Array32
 
-Pixels = TypeVar("Pixels", NDArray[np.uint8], NDArray[np.float32])
+Pixels = TypeVar("Pixels", NDArray[np.uint8], Array32)
 
 
 def reduce_image(image: Pixels, scale: int) -> Pixels:

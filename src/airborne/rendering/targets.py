@@ -14,6 +14,7 @@ from airborne.rendering.lights import Lights
 from airborne.rendering.packing import pack_lights, pack_view
 from airborne.rendering.reduction import reduce_camera, reduce_image
 from airborne.rendering.rows import LANES
+from airborne.types import Array32
 from airborne.video import View
 
 
@@ -23,7 +24,7 @@ class Targets:
 
     views: NDArray[np.float64]  # (v, 18) packed cameras
     sizes: NDArray[np.int64]  # (v, 3) pixels a row, rows, offset in `images`
-    lights: NDArray[np.float32]  # (v, l, 8) packed lamps
+    lights: Array32  # (v, l, 8) packed lamps
     ambient: np.float32
     images: NDArray[np.uint8]  # blocks of 16 reds, 16 greens, 16 blues
     foreground: EvidenceMaps | None  # 1 where a pixel looks like the body, 0 elsewhere

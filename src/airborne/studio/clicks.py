@@ -114,7 +114,7 @@ def _covariance(rig: Rig, px: Array, point: Array, sd_px: float) -> Array:
     shifts = np.concatenate([_STEP_M * np.eye(3), -_STEP_M * np.eye(3)])
     J = np.concatenate([(moved[:3] - moved[3:]).T for moved in (each.px_from_world(point + shifts) for each in seen)])
     J /= 2 * _STEP_M
-    return sd_px**2 * np.linalg.inv(J.T @ J)
+    return np.asarray(sd_px**2 * np.linalg.inv(J.T @ J), float)
 
 
 @dataclass(frozen=True, slots=True)

@@ -224,4 +224,4 @@ def middle_of_view(rig: Rig) -> Array:
         axis = camera.camera_from_world.rotation.inv().apply([0.0, 0.0, 1.0])
         across = np.eye(3) - np.outer(axis, axis)
         A, b = A + across, b + across @ camera.centre
-    return np.linalg.lstsq(A, b, rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0], float)

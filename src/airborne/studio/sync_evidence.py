@@ -52,7 +52,7 @@ def _levels(way: str, source: VideoSource) -> Array:
         level = np.sqrt(np.mean(sound[: len(sound) // step * step].reshape(-1, step) ** 2, axis=1))
         time_s = (np.arange(len(level)) + 0.5) * _STEP_S
     begin, end = (float(source.trial_time(Fraction(t))) for t in (0, 1))
-    return np.stack([begin + time_s * (end - begin), level], axis=1)
+    return np.stack([begin + time_s * (end - begin), level], axis=1).astype(float, copy=False)
 
 
 def _scale(curve: Array) -> Array:

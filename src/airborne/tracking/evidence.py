@@ -70,4 +70,5 @@ class PoseEvidence:
     def add_to(self, covariance: Array, pose: Pose) -> Array:
         """Return the covariance (6 + 3 joints,) squared of a pose that the images gave, with the evidence added."""
         rows, n = self.residuals(pose)[0], self.model.n_dofs
-        return with_unobserved(np.linalg.inv(np.linalg.inv(without_unobserved(covariance, n)) + rows.T @ rows))
+        information = np.linalg.inv(without_unobserved(covariance, n)) + rows.T @ rows
+        return with_unobserved(np.asarray(np.linalg.inv(information), float))

@@ -118,9 +118,9 @@ def _join(model: BodyModel, passes: Passes, takes_backward: NDArray[np.bool_]) -
         return better
     delta, parts = difference.delta, parts_of(model)
     W = [np.linalg.inv(_covariance(each, len(delta))) for each in (forward, backward)]
-    covariance = np.linalg.inv((W[0] + W[1]) / 2)
+    covariance = np.asarray(np.linalg.inv((W[0] + W[1]) / 2), float)
     if not difference.apart:
-        pose = move_pose(forward.pose, np.linalg.solve(W[0] + W[1], W[1] @ delta))
+        pose = move_pose(forward.pose, np.asarray(np.linalg.solve(W[0] + W[1], W[1] @ delta), float))
         return replace(better, pose=pose, covariance=with_unobserved(covariance))
     if 0 in difference.apart:
         pose = backward.pose if takes_backward[0] else forward.pose

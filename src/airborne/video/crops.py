@@ -11,7 +11,7 @@ from av.video.reformatter import ColorRange, Colorspace
 from numpy.typing import NDArray
 
 from airborne.kernels import kernel
-from airborne.types import Image
+from airborne.types import Array32, Image
 from airborne.video.frames import PixelBox
 from airborne.video.pixels import UNSPECIFIED_MATRIX, matrix_for, plane_rows, rgb_from_frame
 
@@ -29,7 +29,7 @@ _PROBE_PX = 32  # side of the image that tests whether a crop converts as the wh
 class ColourConversion:
     """How frames of one format convert to sRGB."""
 
-    scale: NDArray[np.float32]  # (6,) black; factors of luma, red by V, green by U and by V, blue by U
+    scale: Array32  # (6,) black; factors of luma, red by V, green by U and by V, blue by U
     siting_x: tuple[int, int]  # of _SITINGS
     siting_y: tuple[int, int]
     rows_per_chroma: int  # rows of luma per row of chroma
@@ -71,7 +71,7 @@ def rgb_from_part(frame: av.VideoFrame, conversion: ColourConversion, box: Pixel
     return rgb
 
 
-def _scale(red: float, blue: float, *, is_full: bool) -> NDArray[np.float32]:
+def _scale(red: float, blue: float, *, is_full: bool) -> Array32:
     black, luma, chroma = (0, 1.0, 1.0) if is_full else (16, 255 / 219, 255 / 224)
     green = 1 - red - blue
     of_v, of_u = 2 * (1 - red) * chroma, 2 * (1 - blue) * chroma
@@ -84,7 +84,7 @@ def _convert(
     u: NDArray[np.uint8],
     v: NDArray[np.uint8],
     chroma_width: int,
-    scale: NDArray[np.float32],
+    scale: Array32,
     sitings: tuple[tuple[int, int], tuple[int, int]],
     rows_per_chroma: int,
     x0: int,
@@ -132,8 +132,8 @@ def _interpolate_chroma(
     siting: tuple[int, int],
     first: int,
     width: int,
-    mixed: NDArray[np.float32],
-    chroma: NDArray[np.float32],
+    mixed: Array32,
+    chroma: Array32,
 ) -> None:
     """Interpolate the chroma of two rows, zero for grey, to every pixel from column 2 first on: chroma (2 n,).
 

@@ -46,7 +46,7 @@ class Board:
     def corners(self) -> Array:
         """The inner corners (n, 3) [m], row by row; of a thick two-sided board then those of its back (2 n, 3)."""
         nx, ny = self.inner_size
-        grid = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2) * self.square_m
+        grid = np.stack(np.meshgrid(np.arange(float(nx)), np.arange(float(ny))), axis=-1).reshape(-1, 2) * self.square_m
         front = np.column_stack([grid, np.zeros(len(grid))])
         return np.concatenate([front, front + np.array([0, 0, self.thickness_m])]) if self.thickness_m else front
 

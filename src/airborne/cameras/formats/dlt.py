@@ -72,7 +72,7 @@ def dlt_losses(rig: Rig) -> tuple[str, ...]:
 def _camera(where: str, name: str, L: Array, options: FileOptions) -> Camera:
     size = parse_size(where, options.size_of(name, where))
     to_ours = np.linalg.inv(options.pixels.theirs_from_ours(size[1]))
-    P = to_ours @ np.append(L, 1.0).reshape(3, 4)
+    P = np.asarray(to_ours @ np.append(L, 1.0).reshape(3, 4), float)
     P[:, :3] /= options.metres("m")
     length = np.linalg.norm(P[:, :3])
     if length == 0 or np.linalg.svd(P[:, :3] / length, compute_uv=False)[-1] < _SMALLEST_AXIS:

@@ -58,10 +58,10 @@ def fit_fall(time_s: Array, path: Array, R: Array) -> Fall:
     for _ in range(_ROUNDS):
         prior = np.hstack([np.zeros((3, 7)), noise / _OFFSET_SD_M * np.eye(3)])
         terms = np.vstack([design, prior])
-        solution = np.linalg.lstsq(terms, target, rcond=None)[0]
+        solution = np.asarray(np.linalg.lstsq(terms, target, rcond=None)[0], float)
         residual = (path.ravel() - design @ solution).reshape(-1, 3)
         noise = max(_noise(residual, 3 * n - 7), _LEAST_NOISE_M)
-    inverse = np.linalg.inv(terms.T @ terms)
+    inverse = np.asarray(np.linalg.inv(terms.T @ terms), float)
     gravity_sd = max(_noise(residual[:, 2:], n - 3), noise) * np.sqrt(inverse[6, 6])
     return Fall(solution[7:], noise**2 * inverse[7:, 7:], float(solution[6]), float(gravity_sd))
 

@@ -38,7 +38,7 @@ def centre_of_mass(posed: PosedBody) -> tuple[Array, Array]:
     local = np.array([inertia.centre_m for inertia in inertias])
     centres = np.einsum("sij,sj->si", posed.R, local) + posed.t
     jacobian = point_jacobian(posed, np.arange(len(mass)), centres)
-    return mass @ centres / mass.sum(), np.tensordot(mass / mass.sum(), jacobian, axes=1)
+    return mass @ centres / mass.sum(), np.asarray(np.tensordot(mass / mass.sum(), jacobian, axes=1), float)
 
 
 def angular_momentum(model: BodyModel, R: Array, rates: Array) -> Array:

@@ -84,7 +84,7 @@ def ballistic_point(motion: Motion) -> Array:
         residual = float(np.sqrt(np.mean((terms @ solution - target) ** 2)))
         if residual < best:
             best, point = residual, solution[6:]
-    return point
+    return np.asarray(point, float)
 
 
 def player_events(motion: PlayersMotion) -> dict[str, tuple[Event, ...]]:

@@ -227,7 +227,7 @@ def _event_grid(track: LegTrack, rows: tuple[int, int], is_takeoff: bool, floor:
     near = contact & (into_contact <= _EARLIER_S)
     if near.sum() < 2 or contact.sum() < 4:
         return None
-    return at - early + _GRID_S * np.arange(round((early + late) / _GRID_S))
+    return at - early + _GRID_S * np.arange(float(round((early + late) / _GRID_S)))
 
 
 def _one_side(

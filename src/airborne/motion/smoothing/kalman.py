@@ -63,7 +63,7 @@ def kalman_smoother(time_s: Array, values: Array, covariance: Array) -> Smoothed
     density, white_share = maximum_likelihood(time_s, values, noise)
     mean, P = rts_smoother(state_space_model(time_s, values, noise, density, white_share=white_share), values)
     n, k = values.shape
-    per_unit = _period(time_s) ** -np.arange(3)
+    per_unit = _period(time_s) ** -np.arange(3.0)
     value = mean[:, : 3 * k].reshape(n, 3, k) * per_unit[:, None]
     variance = np.diagonal(P, axis1=1, axis2=2)[:, : 3 * k].reshape(n, 3, k)
     sd = np.sqrt(np.maximum(variance, 0.0)) * per_unit[:, None]
@@ -146,7 +146,7 @@ def state_space_model(
         H=np.concatenate([path, nothing, smooth_error, nothing[:, :, :k]], axis=2),
         R=white,
         mean=np.concatenate([first, np.zeros(4 * k)]),
-        P=np.kron(np.diag(prior_variance), one),
+        P=np.asarray(np.kron(np.diag(prior_variance), one), float),
     )
 
 

@@ -178,7 +178,7 @@ def leg_derivatives(
 
     `toward` is -1 for differences back from its end, +1 for differences ahead from its start.
     """
-    steps = toward * np.arange(_STEPS)
+    steps = toward * np.arange(float(_STEPS))
     angles = stance_poses(person, upper_body, stance, time_s + _STEP_S * steps).joint_angles[:, person.joints.ravel()]
     coefficients = np.linalg.solve(np.vander(steps.astype(float), increasing=True), angles.reshape(_STEPS, -1))
     shape = angles.shape[1:]

@@ -20,7 +20,7 @@ from airborne.synthetic.block.court import Layer, draw_clutter, hall_image, net_
 from airborne.synthetic.block.layers import blend_layer, cast_shadows, composite, expose
 from airborne.synthetic.block.players import Player
 from airborne.synthetic.block.scene import BlockScene
-from airborne.types import Array, Image
+from airborne.types import Array, Array32, Image
 from airborne.video import Frames, View
 
 _Rectangle = tuple[int, int, int, int]  # x0, y0, x1, y1 [px]
@@ -149,7 +149,7 @@ def _camera_setup(
         recorded_backgrounds=[
             _record(rng, with_net, gain, pool, quality=scene.difficulty.jpeg_quality) for _ in range(_N_BACKGROUNDS)
         ],
-        floor_from_px=np.linalg.inv(camera.P[:, [0, 1, 3]]),
+        floor_from_px=np.asarray(np.linalg.inv(camera.P[:, [0, 1, 3]]), float),
         bounds=[_image_bounds(camera, drawable) for drawable in drawables],
     )
 
@@ -215,7 +215,7 @@ def _merge(boxes: list[NDArray[np.int64]]) -> list[_Rectangle]:
 
 
 def _composite_body(
-    patch: NDArray[np.float32], box: _Rectangle, camera: Camera, each: Drawable, *, bounds: ImageBounds, index: int
+    patch: Array32, box: _Rectangle, camera: Camera, each: Drawable, *, bounds: ImageBounds, index: int
 ) -> None:
     """Composite a body over the patch, with two samples a pixel side by side, as limbs are mostly upright."""
     x0, y0, x1, y1 = (int(c) for c in bounds.body[index])
@@ -227,9 +227,7 @@ def _composite_body(
     composite(patch, x0 - box[0], y0 - box[1], rendering.colour, rendering.part)
 
 
-def _record(
-    rng: np.random.Generator, patch: NDArray[np.float32], gain: Array, pool: NDArray[np.int8], *, quality: int
-) -> Image:
+def _record(rng: np.random.Generator, patch: Array32, gain: Array, pool: NDArray[np.int8], *, quality: int) -> Image:
     """Return a patch (h, w, 3) after sensor noise and compression."""
     height, width, _ = patch.shape
     v, u = (int(rng.integers(size - own + 1)) for size, own in zip(pool.shape[:2], (height, width), strict=True))

@@ -204,7 +204,7 @@ def _angular_velocity(R: Array, takeoff: Takeoff, inertia: Array, momentum: Arra
     inertia (..., 3, 3), momentum (..., 3): as `MassDistribution` has them.
     """
     own = takeoff.angular_momentum @ R - momentum
-    return np.linalg.solve(inertia, own[..., None])[..., 0]
+    return np.asarray(np.linalg.solve(inertia, own[..., None])[..., 0], float)
 
 
 def _integrate(

@@ -13,6 +13,7 @@ from airborne.cameras import Camera
 from airborne.rendering import Lights, render
 from airborne.rendering.shapes import new_shapes
 from airborne.synthetic.throw.scene import Scene
+from airborne.types import Array32
 from airborne.video import Frames, View
 
 
@@ -39,7 +40,7 @@ def exact_frames(scene: Scene, lights: Lights) -> Iterator[Frames]:
         yield Frames(index, scene.time_s(index), tuple(views))
 
 
-def _backdrop(scene: Scene, camera: Camera, lights: Lights) -> NDArray[np.float32]:
+def _backdrop(scene: Scene, camera: Camera, lights: Lights) -> Array32:
     """Return what a camera sees of the surroundings: (h, w, 3) sRGB, black where there is nothing."""
     width, height = camera.size
     if scene.surroundings is None:

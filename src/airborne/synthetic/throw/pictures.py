@@ -23,7 +23,7 @@ from airborne.rendering.srgb import light_from_srgb, srgb_from_light
 from airborne.synthetic.throw.exact import exact_frames
 from airborne.synthetic.throw.light import boxes_of, ellipsoids_of, is_lit, spot_irradiance
 from airborne.synthetic.throw.scene import Scene
-from airborne.types import Array
+from airborne.types import Array, Array32
 from airborne.video import Frames, View
 
 _BODY_SAMPLES, _BACKGROUND_SAMPLES = 3, 2  # supersampling of a pixel's side
@@ -48,8 +48,8 @@ class Background:
     camera: Camera
     points: Array  # (h, w, 3) world [m]
     normals: Array  # (h, w, 3) unit, world
-    ambient: NDArray[np.float32]  # (h, w, 3) linear light
-    spots: NDArray[np.float32]  # (spots, h, w, 3) linear light, past the surroundings
+    ambient: Array32  # (h, w, 3) linear light
+    spots: Array32  # (spots, h, w, 3) linear light, past the surroundings
 
 
 def scene_frames(scene: Scene) -> Iterator[Frames]:
@@ -102,7 +102,7 @@ def background(scene: Scene, camera: Camera) -> Background:
     return Background(camera, points, normals, ambient, np.array(rest).reshape(-1, height, width, 3))
 
 
-def linear_image(scene: Scene, backdrop: Background, bodies: Sequence[PosedBody]) -> NDArray[np.float32]:
+def linear_image(scene: Scene, backdrop: Background, bodies: Sequence[PosedBody]) -> Array32:
     """Render the whole frame (h, w, 3) in linear light: the mean of the posed bodies over the background."""
     light = _cast_shadow(scene, backdrop, bodies[len(bodies) // 2])
     x0, y0, x1, y1 = _region(scene.body, bodies, backdrop.camera)
@@ -152,7 +152,7 @@ def _radiance(scene: Scene, posed: PosedBody, visible: VisibleSurface) -> Array:
     return light * visible.albedo
 
 
-def _cast_shadow(scene: Scene, backdrop: Background, posed: PosedBody) -> NDArray[np.float32]:
+def _cast_shadow(scene: Scene, backdrop: Background, posed: PosedBody) -> Array32:
     """Return the background (h, w, 3) with the body's shadow on it."""
     light = backdrop.ambient.copy()
     boxes, ellipsoids = _occluders(scene, posed)
@@ -168,7 +168,7 @@ def _occluders(scene: Scene, posed: PosedBody) -> tuple[Array, Array]:
     return boxes_of(solid), ellipsoids_of(solid)
 
 
-def _record(light: NDArray[np.float32], noise_sd: float, rng: np.random.Generator) -> NDArray[np.uint8]:
+def _record(light: Array32, noise_sd: float, rng: np.random.Generator) -> NDArray[np.uint8]:
     """Return the sRGB image (h, w, 3) that a sensor records of linear light, clipped and with noise."""
     shared = rng.standard_normal((*light.shape[:2], 1), np.float32) * _SHARED_NOISE**0.5
     own = rng.standard_normal(light.shape, np.float32) * (1 - _SHARED_NOISE) ** 0.5

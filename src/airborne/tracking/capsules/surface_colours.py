@@ -17,7 +17,7 @@ from airborne.tracking.capsules.jumper import N_DOF, SHOE, SKIN, SOCK, SURFACE_C
 from airborne.tracking.capsules.kernel_arguments import NOBODY, Capsules
 from airborne.tracking.capsules.outlines import draw_labels, project_capsules
 from airborne.tracking.capsules.views import EvidenceTable, PlayerRegion, pack_camera
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _CORE, _AROUND = 0.6, 1.25  # of the thickness: inside _CORE is the player, outside _AROUND the background
 _LEAST_OCCLUSION, _MOST_OCCLUSION = 0.05, 0.9  # bounds of a class's probability to be occluded
@@ -49,9 +49,9 @@ class ClassImages(NamedTuple):
 class SurfaceColours:
     """Colour distributions, 32 bins a channel, and the probability of occlusion of each class in each camera."""
 
-    distributions: NDArray[np.float32]  # (5, 32, 32, 32)
-    first: NDArray[np.float32]  # (5, 32, 32, 32) as the first frame shows them
-    background: NDArray[np.float32]  # (cameras, 32, 32, 32)
+    distributions: Array32  # (5, 32, 32, 32)
+    first: Array32  # (5, 32, 32, 32) as the first frame shows them
+    background: Array32  # (cameras, 32, 32, 32)
     occlusion: Array  # (cameras, 5)
 
     def table(self, view: int, occlusion: Array | None = None) -> EvidenceTable:
@@ -82,7 +82,7 @@ class ColourCounts(NamedTuple):
     """How often regions show each colour."""
 
     classes: Array  # (regions, 5, 32768) on each class, brighter and darker too
-    background: NDArray[np.float32]  # (regions, 32, 32, 32) around the player
+    background: Array32  # (regions, 32, 32, 32) around the player
 
 
 def count_surfaces(regions: Sequence[PlayerRegion], images: Sequence[ClassImages]) -> ColourCounts:
@@ -215,7 +215,7 @@ def _mean_evidence(part: NDArray[np.int8], region: PlayerRegion, colours: Surfac
     return mean_evidence, table.expected
 
 
-def _augment_brightness(counts: NDArray[np.float32]) -> Array:
+def _augment_brightness(counts: Array32) -> Array:
     """Spread colour counts (k, 32, 32, 32) over the same colours in more and in less light."""
     i, *cell = np.unravel_index(np.flatnonzero(counts != 0), counts.shape)  # much sooner than np.nonzero finds them
     lit = np.minimum(_LIGHTS[:, None, None] * (np.array(cell) + 0.5), BINS_PER_CHANNEL - 1)  # (lights, 3, n)

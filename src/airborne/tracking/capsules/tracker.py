@@ -196,7 +196,7 @@ def look_for_others(state: Everybody, estimates: Mapping[str, PlayerEstimate], f
 
 
 def _first_track(first: FirstFrameFit, frames: Frames) -> Track:
-    state, covariance = first.fit.state, np.linalg.inv(first.fit.information)
+    state, covariance = first.fit.state, np.asarray(np.linalg.inv(first.fit.information), float)
     return Track(
         frames.time_s,
         state_at_rest(state[:N_FREE], covariance[:N_FREE, :N_FREE]),
@@ -234,7 +234,7 @@ def _track_player(name: str, track: Track, frames: Frames, *, occluders: Capsule
     region_maps = map_evidence(regions, [track.tables[region.view] for region in regions], track.scale)
 
     def fit(expected: GaussianState) -> JumperFit:
-        information = np.linalg.inv(expected.covariance[:N_FREE, :N_FREE])
+        information = np.asarray(np.linalg.inv(expected.covariance[:N_FREE, :N_FREE]), float)
         prior = JumperPrior(expected.free, information, _contact_points(track.state), np.full(N_POINTS, _SLIP_SD_M))
         return fit_jumper(np.concatenate([expected.free, state[N_FREE:]]), prior, region_maps, occluders)
 
@@ -247,7 +247,7 @@ def _track_player(name: str, track: Track, frames: Frames, *, occluders: Capsule
         again = fit(freed)
         if again.nats > fitted.nats + LEAST_GAIN and leg not in find_unseen_legs(again.owned, reference):
             expected, fitted, evidence = freed, again, evidence_per_px(again.owned)
-    filtered = update(expected, fitted.state[:N_FREE], np.linalg.inv(fitted.information))
+    filtered = update(expected, fitted.state[:N_FREE], np.asarray(np.linalg.inv(fitted.information), float))
     views = [region.view for region in regions]
     track = replace(track, time_s=frames.time_s, filtered=filtered, state=fitted.state)
     occlusion = update_occlusion(track, fitted.owned, views)
@@ -266,7 +266,7 @@ def _track_player(name: str, track: Track, frames: Frames, *, occluders: Capsule
 def _take_up(name: str, track: Track, fitted: JumperFit, frames: Frames) -> tuple[Track, PlayerEstimate]:
     """Go on with a player who was found again."""
     away_s = float(frames.time_s - (track.lost_s or frames.time_s))
-    filtered = state_at_rest(fitted.state[:N_FREE], np.linalg.inv(fitted.information))
+    filtered = state_at_rest(fitted.state[:N_FREE], np.asarray(np.linalg.inv(fitted.information), float))
     colours = replace(track.colours, occlusion=np.full_like(track.colours.occlusion, UNOCCLUDED))
     track = replace(
         track, filtered=filtered, state=fitted.state, colours=colours, tables=evidence_tables(colours), lost_s=None

@@ -13,7 +13,7 @@ from airborne.appearance.surface_classes import blur_maps, class_evidence
 from airborne.cameras import Camera
 from airborne.tracking.capsules.jumper import SURFACE_CLASSES
 from airborne.tracking.capsules.spans import cumulative_sums
-from airborne.types import Array
+from airborne.types import Array, Array32
 from airborne.video import Frames, View
 
 HALF_WIDTH_M, HALF_HEIGHT_M, _BELOW_HIPS_M = 0.8, 1.2, 0.28  # the region around the hips
@@ -41,7 +41,7 @@ class EvidenceTable(NamedTuple):
     """One camera's evidence by colour."""
 
     occlusion: Array  # (5,) that the evidence assumes
-    evidence: NDArray[np.float32]  # (32768, 8) [nat]
+    evidence: Array32  # (32768, 8) [nat]
     expected: Array  # (5,) mean over unoccluded pixels of a class [nat]
     contrast: Array  # (5,) expected less the mean over the background's pixels [nat]
 
@@ -59,7 +59,7 @@ class RegionMaps:
 
     scale: MapScale
     cameras: Array  # (v, 4, 4): K [R t] of the reduced region, then the focal length
-    sums: NDArray[np.float32]  # (v, classes + 1, h, w + 1); the last map is empty
+    sums: Array32  # (v, classes + 1, h, w + 1); the last map is empty
     contrast: Array  # (v, classes + 1) drop of evidence from inside to outside [nat]
 
 

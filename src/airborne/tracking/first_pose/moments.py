@@ -6,11 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, estimate_empty_scene
-from airborne.types import Array
+from airborne.types import Array32
 from airborne.video import Frames, View
 from airborne.video.small import shrink
 
@@ -24,10 +23,10 @@ class Moment:
     """What stands out in every view at one time."""
 
     frames: Frames  # small pictures
-    evidence: tuple[NDArray[np.float32] | None, ...]  # (h, w) by view [nats]; None: no picture, or no empty scene
+    evidence: tuple[Array32 | None, ...]  # (h, w) by view [nats]; None: no picture, or no empty scene
 
     @property
-    def probability(self) -> tuple[NDArray[np.float32] | None, ...]:
+    def probability(self) -> tuple[Array32 | None, ...]:
         """Each pixel's probability (h, w) to show what is not in the empty scene, at even odds."""
         return tuple(None if nats is None else np.asarray(expit(nats), np.float32) for nats in self.evidence)
 
@@ -60,7 +59,7 @@ def look(sample: Sequence[Frames], scenes: Mapping[SourceKey, EmptyScene]) -> li
     return [Moment(frames, tuple(_evidence(view, scenes) for view in frames.views)) for frames in sample]
 
 
-def _evidence(view: View | None, scenes: Mapping[SourceKey, EmptyScene]) -> Array | None:
+def _evidence(view: View | None, scenes: Mapping[SourceKey, EmptyScene]) -> Array32 | None:
     scene = None if view is None else scenes.get(source_of(view))
     return None if view is None or scene is None else scene.evidence(view.rgb)
 

@@ -18,7 +18,7 @@ from airborne.tracking.first_pose.moments import Moment
 from airborne.tracking.first_pose.rigid_search import roots_of
 from airborne.tracking.model_based.degrees_of_freedom import limbs_of
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 THREADS = 2  # the result is the same for any number
 _ROOM = 1.3  # half of the window around a place, in halves of the body's length
@@ -129,7 +129,7 @@ class SilhouetteEvidence:
     """What stands out around a place, in the views that show it."""
 
     cameras: Sequence[Camera]
-    planes: Sequence[NDArray[np.float32]]  # (h, w) [nats]
+    planes: Sequence[Array32]  # (h, w) [nats]
     images: Sequence[NDArray[np.uint8]]  # (h, w, 3)
 
     @classmethod

@@ -31,7 +31,7 @@ from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints
 from airborne.tracking.model_based.gauss_newton import Posteriors, PyramidLevels, fit_silhouettes
 from airborne.tracking.model_based.left_right_swap import swap_limbs
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _N_ORIENTATIONS = 300  # about 20 degrees from any orientation to the nearest
 _BLUR_M, _LIMB_BLUR_M = 0.11, 0.06  # of the evidence: for postures, and for their limbs
@@ -271,7 +271,7 @@ def _fit(person: JointedBody, moment: Moment, poses: PoseSet, levels: PyramidLev
     return PoseSet.of([fit(pose) for pose in poses.each()])
 
 
-def _regions(person: JointedBody, moment: Moment, poses: PoseSet) -> tuple[list[Region], list[Array]]:
+def _regions(person: JointedBody, moment: Moment, poses: PoseSet) -> tuple[list[Region], list[Array32]]:
     """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
     seen = {
         (view.camera.name, view.camera.K.tobytes()): plane

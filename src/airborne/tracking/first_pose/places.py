@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from airborne.appearance.empty_scene import PIXEL_EVIDENCE_LIMIT
 from airborne.cameras import Camera, Rig
 from airborne.tracking.first_pose.moments import Moment
-from airborne.types import Array, Mask
+from airborne.types import Array, Array32, Mask
 
 _LEAST_SHARE = 1e-4  # of the picture that a region covers
 _MOST_REGIONS = 6  # of a view, the largest
@@ -109,7 +109,7 @@ def moving_regions(moment: Moment) -> list[list[MovingRegion]]:
     ]
 
 
-def connected_regions(camera: Camera, nats: NDArray[np.float32]) -> list[MovingRegion]:
+def connected_regions(camera: Camera, nats: Array32) -> list[MovingRegion]:
     """Return the regions of a view that stand out by their evidence (h, w) [nats], the largest first."""
     is_new = cv2.morphologyEx((nats > 0).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
     _, labels, boxes, _ = cv2.connectedComponentsWithStats(is_new)

@@ -26,7 +26,7 @@ from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors, PyramidLevels, fit_silhouettes
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _N_ORIENTATIONS = 3000  # about 9 degrees from any orientation to the nearest
 _BLURS = (0.12, 0.06, 0.03)  # of the evidence, in body radii, coarse to fine
@@ -153,7 +153,7 @@ def roots_of(poses: Sequence[Pose]) -> tuple[Array, Array]:
     return np.stack([root.rotation.as_matrix() for root in roots]), np.stack([root.translation for root in roots])
 
 
-def candidate_regions(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array]]:
+def candidate_regions(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array32]]:
     """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
     bodies = [thing.render_model.with_pose(pose) for pose in poses]
     seen = {
@@ -166,7 +166,7 @@ def candidate_regions(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tu
     return regions, [np.ascontiguousarray(region.crop(seen[region.source])) for region in regions]
 
 
-def full_maps(moment: Moment, planes: Sequence[Array | None]) -> EvidenceMaps:
+def full_maps(moment: Moment, planes: Sequence[Array32 | None]) -> EvidenceMaps:
     """Sum planes (h, w), one a view, for `mask_evidence`; None where a view has none."""
     kept = [
         (view.camera, plane)

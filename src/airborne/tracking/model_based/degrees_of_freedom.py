@@ -86,15 +86,15 @@ class DegreesOfFreedom:
         H (d, d), g (d,) in units of the noise's variance.
         """
         if not self.moves_joints and prior is None:
-            return np.linalg.solve(H + np.diag(self._damping), g)
+            return np.asarray(np.linalg.solve(H + np.diag(self._damping), g), float)
         of_prior = linearise_prior(self, pose, prior)
         H, g = H + np.diag(self._damping) + of_prior.H, g + of_prior.g
-        delta = np.linalg.solve(H, g)
+        delta = np.asarray(np.linalg.solve(H, g), float)
         for _ in range(_LIMIT_ROUNDS):
             rows, targets = self._walls(pose, delta)
             if not len(rows):
                 return delta
-            delta = np.linalg.solve(H + rows.T @ rows, g + rows.T @ targets)
+            delta = np.asarray(np.linalg.solve(H + rows.T @ rows, g + rows.T @ targets), float)
         return delta
 
     def prior_cost(self, pose: Pose, prior: PosePrior | None) -> float:

@@ -31,7 +31,7 @@ from airborne.tracking.model_based.render_model import (
 )
 from airborne.tracking.model_based.shape_error import shape_error_gradients, shape_error_px
 from airborne.tracking.model_based.twist_equations import Sums, new_blocks, one_block
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 PyramidLevels = Sequence[tuple[int, int]]
 
@@ -56,7 +56,7 @@ class Posteriors:
     """Regions and each of their pixels' probability to be body, reduced once for all fits of masks to them."""
 
     regions: Sequence[Region]
-    planes: Sequence[Array]  # (h, w) each
+    planes: Sequence[Array32]  # (h, w) each
     _reduced: dict[int, list[ViewBuffers]] = field(default_factory=dict)
 
     def reduce(self, reduction: int) -> list[ViewBuffers]:

@@ -16,7 +16,7 @@ from airborne.geometry.sampling import latin_hypercube
 from airborne.rendering import EvidenceMaps, evidence_maps, mask_evidence
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.render_model import RenderModel, reduce_region
-from airborne.types import Array
+from airborne.types import Array, Array32
 from airborne.video import Frames
 
 _ROUNDS = ((1024, 32), (512, 16), (256, 8))  # proposals, survivors; the sds are halved in each round
@@ -97,7 +97,7 @@ def _px_per_m(pose: Pose, frames: Frames) -> float:
     return float(max(scales, default=0.0))
 
 
-def region_evidence(regions: Sequence[Region], posteriors: Sequence[Array]) -> EvidenceMaps:
+def region_evidence(regions: Sequence[Region], posteriors: Sequence[Array32]) -> EvidenceMaps:
     """Turn the posteriors (h, w) of the regions into reduced maps of evidence [nats]."""
     cameras, planes = [], []
     for region, posterior in zip(regions, posteriors, strict=True):

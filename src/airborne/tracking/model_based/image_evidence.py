@@ -23,7 +23,7 @@ from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.shape_error import shape_gradients
 from airborne.tracking.model_based.texture import patch_colours
-from airborne.types import Array
+from airborne.types import Array, Array32
 from airborne.video import Frames
 
 
@@ -39,7 +39,7 @@ class ImageEvidence:
     cost: float  # [nat]
     misfit: float  # variance of the images' residual, by which they are weighed
     of_shape: Array  # (k, d) changes of the gradient by errors of the surface of an sd each, the same at all times
-    colours: Sequence[Array] = ()  # (patches, 3) of a surface of patches, an image each; see `texture`
+    colours: Sequence[Array32] = ()  # (patches, 3) of a surface of patches, an image each; see `texture`
 
 
 def linearise_evidence(

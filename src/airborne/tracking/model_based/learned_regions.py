@@ -15,7 +15,7 @@ from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.image_views import ImageView, make_image_views
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array32
 
 MARGIN_PX = 12  # of a full frame: the blur's radius, and how far images move a body beyond its silhouettes
 
@@ -36,7 +36,7 @@ class LearnedRegions:
         return cls(Posteriors(learned, [appearance.posterior(region) for region in learned]), appearance)
 
     @property
-    def views(self) -> tuple[Sequence[Region], Sequence[Array]]:
+    def views(self) -> tuple[Sequence[Region], Sequence[Array32]]:
         """The regions and each pixel's probability (h, w) to be body."""
         return self.masks.regions, self.masks.planes
 

@@ -22,7 +22,7 @@ from airborne.kernels import kernel
 from airborne.rendering import EvidenceMaps, mask_evidence, mask_out_surface
 from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _N_FIRST = 24  # survivors of the starts
 _ROUNDS = ((512, 24), (512, 16), (512, 3))  # proposals, survivors; the sds are halved in each round
@@ -52,7 +52,7 @@ class LimbFaults(NamedTuple):
 
 
 def find_misplaced_limbs(
-    render_model: RenderModel, pose: Pose, regions: Sequence[Region], posteriors: Sequence[Array]
+    render_model: RenderModel, pose: Pose, regions: Sequence[Region], posteriors: Sequence[Array32]
 ) -> LimbFaults:
     """Find the limbs of which some segment covers pixels unlike the body in some view."""
     n = len(render_model.model.segments)

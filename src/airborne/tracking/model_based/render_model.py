@@ -32,7 +32,7 @@ from airborne.tracking.model_based.kernel_arguments import (
     Window,
 )
 from airborne.tracking.model_based.normal_equations import prepare_rows
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _TO_SHARE = (np.arange(1024) / 1023).astype(np.float32)  # sRGB as shares of full, for `light_planes`
 
@@ -45,7 +45,7 @@ class RenderModel:
     geometry: SurfaceArrays
     shapes: Any
     segment_of_part: NDArray[np.int16]  # (parts,)
-    albedo: NDArray[np.float32]  # (parts, 3) linear light
+    albedo: Array32  # (parts, 3) linear light
     is_faceted: NDArray[np.bool_]  # (parts,) they have visible edges between flat sides
     cloth: NDArray[np.int16]  # (parts,) which parts are of one cloth
     symmetry_axes: dict[int, Array]  # segment -> (k, 3) in its frame: rotations about them change nothing
@@ -181,7 +181,7 @@ def image_buffers(render_model: RenderModel, region: Region, appearance: Appeara
     return ViewBuffers(region.packed_view, region.camera.K, observation, maps, whole, light)
 
 
-def silhouette_buffers(region: Region, posterior: Array, reduction: int, *, taps: Array, clip: float) -> ViewBuffers:
+def silhouette_buffers(region: Region, posterior: Array32, reduction: int, *, taps: Array, clip: float) -> ViewBuffers:
     """Prepare a region and its posterior, reduced, for a comparison of masks."""
     rows = _rows_of(region, reduction)
     plane = _reduce_plane(posterior, reduction, rows)
@@ -196,7 +196,7 @@ def silhouette_buffers(region: Region, posterior: Array, reduction: int, *, taps
     return view.prepare(Comparison(taps, taps, clip))
 
 
-def reduce_region(region: Region, plane: Array, reduction: int) -> tuple[Camera, NDArray[np.float32]]:
+def reduce_region(region: Region, plane: Array32, reduction: int) -> tuple[Camera, Array32]:
     """Reduce a plane (h, w) of a region by averaging areas to about square pixels; return its camera and itself."""
     rows = _rows_of(region, reduction)
     small = _reduce_plane(plane, reduction, rows)
@@ -208,7 +208,7 @@ def _rows_of(region: Region, reduction: int) -> int:
     return max(1, round(reduction * region.aspect))
 
 
-def _reduce_plane(plane: Array, reduction: int, rows: int) -> NDArray[np.float32]:
+def _reduce_plane(plane: Array32, reduction: int, rows: int) -> Array32:
     height, width = plane.shape
     size = (max(width // reduction, 1), max(height // rows, 1))
     small = cv2.resize(plane[: size[1] * rows, : size[0] * reduction], size, interpolation=cv2.INTER_AREA)

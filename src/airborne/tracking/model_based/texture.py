@@ -20,7 +20,7 @@ from airborne.geometry.robust import known_median
 from airborne.rendering.shapes import new_shapes
 from airborne.tracking.model_based.image_views import ImageView
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 # chosen, of a patch: with 30 and 90 mm two synthetic people, whose clothes end within segments, are tracked alike
 _SIZE_M = 0.05
@@ -65,7 +65,7 @@ def _cells(points_m: Array, along: int) -> tuple[NDArray[np.int64], NDArray[np.i
     return around, np.minimum((share * n_along).astype(int), n_along - 1)
 
 
-def patch_colours(render_model: RenderModel, image: ImageView, shown: NDArray[np.bool_]) -> Array:
+def patch_colours(render_model: RenderModel, image: ImageView, shown: NDArray[np.bool_]) -> Array32:
     """Return the patches' albedo (patches, 3) in an image whose light was fitted; NaN where it does not show them.
 
     shown (segments,): those that surely lie where the pose has them. Pixels beside another segment or the scene are
@@ -80,10 +80,10 @@ def patch_colours(render_model: RenderModel, image: ImageView, shown: NDArray[np
     patch = maps.part[is_inner]
     seen, own = (np.stack([np.bincount(patch, each[is_inner], n) for each in of], axis=1) for of in (observed, light))
     has_pixels = (np.bincount(patch, minlength=n) >= _FEWEST_PX)[:, None]
-    return np.where(has_pixels, seen / np.where(has_pixels, own, 1), np.nan).astype(np.float32)
+    return np.asarray(np.where(has_pixels, seen / np.where(has_pixels, own, 1), np.nan), np.float32)
 
 
-def with_texture(render_model: RenderModel, colours: Sequence[Array]) -> RenderModel:
+def with_texture(render_model: RenderModel, colours: Sequence[Array32]) -> RenderModel:
     """Return the body with each patch in the median of its colours, (patches, 3) an image; few leave it as it is."""
     albedo = render_model.albedo.copy()
     stack = np.array(colours, np.float32).reshape(-1, *albedo.shape)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from airborne.appearance.model import Region
 from airborne.body import PosedBody
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _BODY_LIKE = 0.8  # least probability to be body
 _RIM_M = 0.02  # what lies this close to the mask may be flesh, hair or clothes
@@ -28,7 +28,7 @@ class Uncovered(NamedTuple):
 
 
 def find_uncovered(
-    render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array]
+    render_model: RenderModel, posed: PosedBody, regions: Sequence[Region], posteriors: Sequence[Array32]
 ) -> Uncovered:
     """Find what is like the body and not covered, wide enough for a limb."""
     views = zip(regions, posteriors, strict=True)
@@ -37,7 +37,7 @@ def find_uncovered(
 
 
 def _in_one_view(
-    render_model: RenderModel, posed: PosedBody, region: Region, posterior: Array
+    render_model: RenderModel, posed: PosedBody, region: Region, posterior: Array32
 ) -> tuple[NDArray[np.bool_], Array]:
     """Return the pixels (h, w) of large uncovered patches, and the area beside each segment: (segments,) [m²]."""
     depth_m = float(np.median(posed.t @ region.packed_view[6:9] + region.packed_view[11]))

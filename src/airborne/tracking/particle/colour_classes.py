@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from airborne.appearance.foreground import count_colours
 from airborne.appearance.hue_saturation import CODES, bin_table
 from airborne.tracking.particle.rods import CLASS_SHIFT
+from airborne.types import Array32
 
 _UNOBSERVED = 2e-5  # probability of an unobserved colour, per cell: a colour in neither histogram belongs to no class
 
 
-def colour_counts(rgb: NDArray[np.uint8], mask: NDArray) -> NDArray[np.float32]:
+def colour_counts(rgb: NDArray[np.uint8], mask: NDArray) -> Array32:
     """Count the masked pixels' colours, smoothed over neighbours: rgb (h, w, 3), mask (h, w) -> (32, 32, 32)."""
     counts = np.zeros((32, 32, 32), np.float32)
     count_colours(np.ascontiguousarray(rgb), mask, 1, counts)

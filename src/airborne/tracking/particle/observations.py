@@ -19,7 +19,7 @@ from airborne.tracking.particle.view_likelihood import (
     mix_with_background,
     recognition,
 )
-from airborne.types import Array
+from airborne.types import Array, Array32, Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +38,7 @@ class LegsObservation:
         """Number of cameras that count for any part."""
         return int(self.used.any(axis=0).sum())
 
-    def log_likelihood(self, ends: Array, parts: Sequence[int]) -> Array:
+    def log_likelihood(self, ends: Array, parts: Sequence[int]) -> Floats:
         """Return equation 6 of every rod: ends (n, k, 2, 3) [m] of k parts -> (n, k) [nat]."""
         parts = list(parts)
         overlap, share = self.compare(ends, parts)
@@ -49,7 +49,7 @@ class LegsObservation:
             recognised = mix_with_background(recognised, recognition(background[1]))
         return combine_views(detected, recognised, self.used[parts])
 
-    def compare(self, ends: Array, parts: Sequence[int]) -> tuple[Array, Array]:
+    def compare(self, ends: Array, parts: Sequence[int]) -> tuple[Array32, Array32]:
         """Return overlap and share of every rod in every view: (n, k, views); zeros without an image."""
         n, k = ends.shape[:2]
         overlap, share = np.zeros((2, len(self.codes), n, k), np.float32)

@@ -13,7 +13,7 @@ from airborne.appearance.hue_saturation import HSV_BINS, bin_table, look_up, roo
 from airborne.tracking.particle.colour_classes import code_table, colour_counts
 from airborne.tracking.particle.image_regions import ImageRegion
 from airborne.tracking.particle.rods import CLASS_SHIFT, count_rods, rod_corners
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _CLASS_SETS = 8  # of three classes
 
@@ -33,7 +33,7 @@ class References:
 
     parts: Parts
     tables: tuple[NDArray[np.uint16], ...]  # per view: every colour's code (32768,)
-    roots: NDArray[np.float32]  # (views, parts, 111): square roots of the normalised histograms
+    roots: Array32  # (views, parts, 111): square roots of the normalised histograms
     background_overlap: Array  # (views, parts): of each part's histogram with that of the background
     background_share: Array  # (views, parts): of its classes in the background
 
@@ -41,8 +41,8 @@ class References:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Counts:
     rods: Array  # (parts, 111) histograms of the rods' samples
-    classes: tuple[Array, ...]  # (32, 32, 32) each, colour histograms
-    rest: Array  # (32, 32, 32) colour histogram of what no rod covers
+    classes: tuple[Array32, ...]  # (32, 32, 32) each, colour histograms
+    rest: Array32  # (32, 32, 32) colour histogram of what no rod covers
 
 
 def learn_references(
@@ -104,7 +104,7 @@ def _count_region(region: ImageRegion, ends: Array, parts: Parts) -> _Counts:
     return _Counts(rods, classes, colour_counts(region.rgb, ~np.any(masks, axis=0)))
 
 
-def _by_class(rest: Array, table: NDArray[np.uint16]) -> Array:
+def _by_class(rest: Array32, table: NDArray[np.uint16]) -> Array:
     """Return how often each set of classes and each bin occurs in the background: (8, 111)."""
     counts = np.zeros((_CLASS_SETS, HSV_BINS + 1))
     np.add.at(counts, (table >> CLASS_SHIFT, table & 255), np.asarray(rest, float).ravel())

@@ -78,7 +78,7 @@ def point_estimate(particles: Particles, rule: EstimateAs) -> Array:
         return particles.mean
     top = np.argsort(-particles.log_weights, kind="stable")[:N_TOP]
     weights = np.exp(particles.log_weights[top] - particles.log_weights[top[0]])
-    return np.tensordot(weights / weights.sum(), particles.values[top], 1)
+    return np.asarray(np.tensordot(weights / weights.sum(), particles.values[top], 1), float)
 
 
 def second_moments(values: Array, weights: Array, about: Array) -> Array:

@@ -24,7 +24,7 @@ from airborne.tracking.self_check.registration import (
     to_px,
     warp_plane,
 )
-from airborne.types import Array, Ints
+from airborne.types import Array, Array32, Ints
 
 _LIGHT = light_from_srgb(np.arange(256.0)).astype(np.float32)
 _SIDE_SHARE = 0.02  # of the silhouette that a side covers at least to have a light of its own
@@ -87,7 +87,7 @@ def _crop(silhouette: Silhouette, window: tuple[slice, slice]) -> Silhouette:
     return replace(silhouette, mask=silhouette.mask[window], side=silhouette.side[window], middle=middle)
 
 
-def _near_edges(drawn: list[NDArray[np.float32]]) -> tuple[Ints, Ints]:
+def _near_edges(drawn: list[Array32]) -> tuple[Ints, Ints]:
     """Return rows and columns (n,) of the pixels that the widest blur mixes of sides, or a side and the scene."""
     shares = [blur(side, _BLURS_PX[-1]) for side in drawn]
     mixed = np.max([share * (1 - share) for share in shares], axis=0)
@@ -95,7 +95,7 @@ def _near_edges(drawn: list[NDArray[np.float32]]) -> tuple[Ints, Ints]:
     return rows, columns
 
 
-def _sides(silhouette: Silhouette) -> list[NDArray[np.float32]]:
+def _sides(silhouette: Silhouette) -> list[Array32]:
     """Return the masks (h, w) of the sides that the silhouette shows; the last: small ones."""
     is_body = silhouette.side >= 0
     labels, counts = np.unique(silhouette.side[is_body], return_counts=True)
@@ -104,7 +104,7 @@ def _sides(silhouette: Silhouette) -> list[NDArray[np.float32]]:
     return [side.astype(np.float32) for side in (*sides, rest) if side.any()]
 
 
-def _blur_shares(silhouette: Silhouette, drawn: list[NDArray[np.float32]], sigma: float) -> NDArray[np.float32]:
+def _blur_shares(silhouette: Silhouette, drawn: list[Array32], sigma: float) -> Array32:
     """Return each drawn side's share of every pixel of a blurred image: (k, h, w)."""
     sx, sy = silhouette.to_view
     sigma_y = float(np.hypot(sigma, 0 if sy >= sx else np.sqrt(3) / 4 * sx / sy))  # rows of fields are interpolated
@@ -112,7 +112,7 @@ def _blur_shares(silhouette: Silhouette, drawn: list[NDArray[np.float32]], sigma
 
 
 def _light_of_sides(
-    shares: NDArray[np.float32], rows: Ints, columns: Ints, light: Array, scene: Array, median: Array
+    shares: Array32, rows: Ints, columns: Ints, light: Array32, scene: Array32, median: Array32
 ) -> Array:
     """Return the sides' light (k, 3) that gives the n pixels best; `median` (3,) is that of the body."""
     A, B = mixture_equations(shares, rows, columns, light, scene)
@@ -123,4 +123,4 @@ def _step(H: Array, g: Array) -> Array:
     """Return a Gauss-Newton step of the offset (5,) by its normal equations."""
     step = np.linalg.solve(H + 1e-6 * np.diag(np.diag(H)) + 1e-9 * np.eye(len(H)), g)
     most = np.array([_MOST_PX, _MOST_PX, _MOST_TURN, _MOST_TURN, _MOST_PX])
-    return np.clip(step, -most, most)
+    return np.asarray(np.clip(step, -most, most), float)

@@ -19,7 +19,7 @@ from airborne.tracking.model_based.degrees_of_freedom import limb_of_segment, li
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.path import alarm
 from airborne.tracking.self_check.registration import Silhouette, sample_box
-from airborne.types import Array, Image
+from airborne.types import Array, Array32, Image
 
 _STANDS_OUT = 0.5  # chosen: of what `foreground` gives, from 0 to 1
 _DARKEST, _SAME = 0.3, 0.12  # chosen: to what share a shadow darkens an sRGB level, at least; how alike all channels
@@ -30,9 +30,7 @@ _LEAST_M = 0.10
 _FEWEST_MOMENTS = 3  # chosen: of which a view's median is taken
 
 
-def reach_beyond(
-    render_model: RenderModel, silhouette: Silhouette, rgb: Image, scene: Image, shown: NDArray[np.float32]
-) -> Array:
+def reach_beyond(render_model: RenderModel, silhouette: Silhouette, rgb: Image, scene: Image, shown: Array32) -> Array:
     """Return how far what stands out, connected with the silhouette, reaches beyond each segment: (segments,) [m].
 
     rgb, scene, shown: as `foreground` takes them, and what it gives. NaN for segments that are not seen. Shadows do not

@@ -18,7 +18,7 @@ from airborne.cameras import Camera
 from airborne.rendering.maps import SurfaceMaps
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.self_check.offset_equations import foreground_equations
-from airborne.types import Array
+from airborne.types import Array, Array32
 
 _SIDES = 3**3  # that a part may face: along each of its axes forward, back or neither
 N_SIMILARITY = 4  # shift right, shift down [px], turn clockwise [rad], log scale, about the silhouette's middle
@@ -47,8 +47,8 @@ class Silhouette:
     """A body's silhouette drawn in an image of about square pixels."""
 
     camera: Camera  # of that image
-    mask: NDArray[np.float32]  # (h, w) 0 or 1
-    inverse_depth: NDArray[np.float32]  # (h, w) [1/m]
+    mask: Array32  # (h, w) 0 or 1
+    inverse_depth: Array32  # (h, w) [1/m]
     side: NDArray[np.int64]  # (h, w) which side of which part; -1 where there is none
     middle: Array  # (2,) [px] of the mask's bounding box
     box: tuple[int, int, int, int]  # x0, y0, x1, y1 of the view's image that it covers
@@ -115,7 +115,7 @@ def _mask_corners(render_model: RenderModel, posed: PosedBody, camera: Camera) -
     return np.array([columns[0], rows[0]], float), np.array([columns[-1], rows[-1]], float)
 
 
-def foreground(rgb: NDArray[np.uint8], empty: NDArray[np.uint8], silhouette: Silhouette) -> NDArray[np.float32]:
+def foreground(rgb: NDArray[np.uint8], empty: NDArray[np.uint8], silhouette: Silhouette) -> Array32:
     """Return how much each pixel of the silhouette's image stands out from the empty scene: (h, w), 0..1.
 
     rgb (H, W, 3): the view's image; empty (h', w', 3): the scene without the body, in the silhouette's box.
@@ -126,7 +126,7 @@ def foreground(rgb: NDArray[np.uint8], empty: NDArray[np.uint8], silhouette: Sil
     return sample_box(silhouette, share)
 
 
-def sample_box(silhouette: Silhouette, plane: NDArray[np.float32]) -> NDArray[np.float32]:
+def sample_box(silhouette: Silhouette, plane: Array32) -> Array32:
     """Sample what fills the silhouette's box in the view, (h', w') or (h', w', k), at the silhouette's pixels."""
     sx, sy = silhouette.to_view
     if sx > 1:
@@ -138,7 +138,7 @@ def sample_box(silhouette: Silhouette, plane: NDArray[np.float32]) -> NDArray[np
     return np.asarray(warped, np.float32)
 
 
-def register(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array | None:
+def register(silhouette: Silhouette, shown: Array32) -> Array | None:
     """Find the offset (4,) of the foreground `shown` (h, w) from a silhouette; None where they are not alike.
 
     Positive: the foreground lies right, down [px of the view's columns], turned clockwise [rad], is larger [log].
@@ -167,7 +167,7 @@ def to_px(silhouette: Silhouette) -> Array:
     return np.array([silhouette.to_view[0], silhouette.to_view[0], 1, 1])
 
 
-def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
+def _search(silhouette: Silhouette, shown: Array32) -> Array:
     """Find shift, turn and scale on reduced images by normalised correlation."""
     height, width = shown.shape
     size = (max(width // _COARSE, 8), max(height // _COARSE, 8))
@@ -191,7 +191,7 @@ def _search(silhouette: Silhouette, shown: NDArray[np.float32]) -> Array:
     return best
 
 
-def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array) -> tuple[Array, float]:
+def _refine(silhouette: Silhouette, shown: Array32, offset: Array) -> tuple[Array, float]:
     """Refine an offset (4,) on images less and less blurred; return it, and how silhouette and foreground correlate."""
     offset = np.append(offset, 0.0)  # the last: how much wider the outline is [px]
     for sigma in _SIGMA_PX:
@@ -201,9 +201,7 @@ def _refine(silhouette: Silhouette, shown: NDArray[np.float32], offset: Array) -
     return offset[:N_SIMILARITY], _correlation(drawn, blur(shown, _SIGMA_PX[-1]))
 
 
-def _refine_at(
-    silhouette: Silhouette, shown: NDArray[np.float32], offset: Array, sigma: float, *, converged_px: float
-) -> Array:
+def _refine_at(silhouette: Silhouette, shown: Array32, offset: Array, sigma: float, *, converged_px: float) -> Array:
     """Step to the least squares of blurred silhouette and foreground, robustly.
 
     offset (5,): shift, turn, scale and how much wider the outline is [px of the silhouette].
@@ -219,9 +217,7 @@ def _refine_at(
     return offset
 
 
-def _refinement_step(
-    silhouette: Silhouette, image: NDArray[np.float32], mask: NDArray[np.float32], offset: Array, *, sigma: float
-) -> Array:
+def _refinement_step(silhouette: Silhouette, image: Array32, mask: Array32, offset: Array, *, sigma: float) -> Array:
     """Return the step (5,) of least squares, no longer than the blur reaches."""
     drawn = warp_plane(silhouette, offset, mask)
     H, g = foreground_equations(drawn, image, silhouette.middle, offset, _CLIP, _LEAST_STEEP)
@@ -233,7 +229,7 @@ def _refinement_step(
     return step
 
 
-def warp_plane(silhouette: Silhouette, offset: Array, plane: NDArray[np.float32]) -> NDArray[np.float32]:
+def warp_plane(silhouette: Silhouette, offset: Array, plane: Array32) -> Array32:
     """Shift, turn and scale a plane (h, w) about the silhouette's middle."""
     c, s = np.exp(offset[3]) * np.array([np.cos(offset[2]), np.sin(offset[2])])
     A = np.array([[c, -s], [s, c]])
@@ -264,10 +260,10 @@ def _outline_derivatives(silhouette: Silhouette, posed: PosedBody) -> tuple[Arra
     return C, np.asarray(np.stack([gx, gy, gy * dx - gx * dy, gx * dx + gy * dy, -np.hypot(gx, gy)]), float)
 
 
-def blur(plane: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
+def blur(plane: Array32, sigma: float) -> Array32:
     """Blur a plane (h, w), or (h, w, k), by a Gaussian [px]."""
     return np.asarray(cv2.GaussianBlur(plane, (0, 0), sigma), np.float32)
 
 
-def _correlation(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
+def _correlation(a: Array32, b: Array32) -> float:
     return float(np.corrcoef(a.ravel(), b.ravel())[0, 1])

@@ -158,7 +158,7 @@ def pose_errors(evidence: Evidence, weights: Array) -> PoseErrors:
     edge = evidence.edge.sum(axis=1)
     floor = 1e-4 * np.trace(edge, axis1=1, axis2=2)[:, None, None] * np.eye(6) / 6
     by_parameter = -np.linalg.solve(edge + floor, evidence.edge_by_parameter.sum(axis=1))
-    inverse = np.linalg.inv(A)
+    inverse = np.asarray(np.linalg.inv(A), float)
     return PoseErrors((inverse @ b[..., None])[..., 0], -inverse @ C, by_parameter, inverse)
 
 
