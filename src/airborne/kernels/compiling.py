@@ -3,13 +3,16 @@
 A kernel's object code holds copies of the kernels that it calls, compiled anew among its own code. Numba leaves these
 copies visible, as weak symbols, and the linker then takes one copy for all: the one that was loaded first. That is the
 called kernel's own in a process that compiles, and a caller's copy in one that loads from the cache. Under fast maths
-the two differ in the last digits. So a kernel here keeps its copies to itself.
+the two differ in the last digits. So a kernel here keeps its copies to itself. Numba's own helpers, as that of `x**2`,
+are compiled once a process, with fast maths or without, as the kernel is that needs them first; here, once for each.
 """
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -96,6 +99,20 @@ class _InnerLibrary(_Library):
         self._finalized = True
 
 
+_HELPERS: dict[bool, dict[Any, Any]] = defaultdict(dict)  # of Numba's own, by whether maths is fast
+
+
+@contextmanager
+def _own_helpers(context: Any, *, fastmath: bool) -> Iterator[None]:
+    """Let a kernel share Numba's helpers with those alone whose maths is as fast."""
+    callers = context.cached_internal_func
+    context.cached_internal_func = _HELPERS[fastmath]
+    try:
+        yield
+    finally:
+        context.cached_internal_func = callers
+
+
 _SHARED = llvm.Linkage.linkonce_odr
 _ENVIRONMENT = "_ZN08NumbaEnv"
 
@@ -113,7 +130,8 @@ class _Compiler(Compiler):
         collects = gc.isenabled()
         gc.disable()  # it would go through Numba's trees again and again: a fifth of the time
         try:
-            return super().compile_extra(func)
+            with _own_helpers(self.state.targetctx, fastmath=bool(self.state.flags.fastmath)):
+                return super().compile_extra(func)
         finally:
             if collects:
                 gc.enable()
