@@ -80,6 +80,10 @@ def verdict(moments: Sequence[Moment], names: Sequence[str], mix_up: MixUp | Non
     return "asked" if right in " ".join(doubts) and (odd or mix_up is not None) else "wrong"
 
 
+def _kind(mix_up: MixUp) -> str:
+    return "a mix-up" if len(mix_up.cameras) < 3 else "videos passed on in turn"
+
+
 def verdicts(scenes: Iterator[Scene]) -> Iterator[tuple[str, str]]:
     """Yield what each scene is with, and what is said of it."""
     before: list[Moment] = []
@@ -87,7 +91,7 @@ def verdicts(scenes: Iterator[Scene]) -> Iterator[tuple[str, str]]:
         moments, names, found = moments_of(scene), scene.rig.names, []
         found.append(("nothing", verdict(moments, names)))
         found += [
-            ("a mix-up", verdict(with_mix_up(moments, mix_up), names, mix_up))
+            (_kind(mix_up), verdict(with_mix_up(moments, mix_up), names, mix_up))
             for mix_up in possible_mix_ups(len(names))
         ]
         k = scene.seed % len(names)

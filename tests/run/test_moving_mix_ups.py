@@ -110,6 +110,13 @@ def test_a_mix_up_that_others_explain_nearly_as_well_is_asked_about(monkeypatch)
     assert MIX_UPS[0].describe(RIG.names) in doubt
 
 
+def test_passing_on_three_goes_before_an_exchange_only_where_it_is_clearly_another():
+    exchange_of_three = [0.02, 0.3, 0.03], [0.02, 0.3]  # shares with each mix-up, and with the simple ones
+    assert moving_mix_ups._clear_mix_up(*exchange_of_three, 0.3, 3.0, 2.0) == 0
+    passed_on = [0.09, 0.3, 0.03], [0.09, 0.3]
+    assert moving_mix_ups._clear_mix_up(*passed_on, 0.3, 3.0, 2.0) == 2
+
+
 @pytest.mark.parametrize("known", [0, 1])
 def test_where_fewer_than_two_cameras_see_something_whole_nothing_is_said(known):
     def change(number, evidence):

@@ -192,12 +192,13 @@ class MixUp:
 def possible_mix_ups(n_cameras: int) -> list[MixUp]:
     """Return what can be mixed up: the videos of two cameras, three or all, each one's images, mirrored or upside down.
 
-    Three and all are mixed up in turn: each camera has the video of the next, or of the one before.
+    Three and all are mixed up in turn, and come last: each camera has the video of the next, or of the one before.
     """
     alone, exchanged, of_three = (list(combinations(range(n_cameras), n)) for n in (1, 2, 3))
     in_turn = of_three * (n_cameras <= _MOST_CAMERAS) + [tuple(range(n_cameras))] * (n_cameras > 3)
     in_turn = [each for cameras in in_turn for each in (cameras, cameras[::-1])]
-    return [*map(MixUp, exchanged + in_turn), *map(MixUp, alone), *(MixUp(camera, is_turned=True) for camera in alone)]
+    turned = (MixUp(camera, is_turned=True) for camera in alone)
+    return [*map(MixUp, exchanged), *map(MixUp, alone), *turned, *map(MixUp, in_turn)]
 
 
 def find_undecided_mix_ups(rig: Rig, foregrounds: Sequence[Mask | None], model: BodyModel, start: Pose) -> list[MixUp]:

@@ -77,9 +77,10 @@ def compare_silhouettes(moments: Sequence[Moment]) -> MovingSilhouettes:
     mix_ups = [each for each in possible_mix_ups(len(names)) if len({cameras[i].size for i in each.cameras}) == 1]
     without = [_median_uncovered(_undo(mix_up, *each) for each in chosen) for mix_up in mix_ups]
     what = f"{as_they_are:.0%} of the silhouettes of what moves cannot be one body's"
-    if (best := _clear_minimum(without, as_they_are, *_OF_DOUBT)) is not None:
+    simple = without[: sum(len(mix_up.cameras) < 3 for mix_up in mix_ups)]
+    if (best := _clear_mix_up(without, simple, as_they_are, *_OF_DOUBT)) is not None:
         shows = f"{what}, and {without[best]:.0%} with {mix_ups[best].describe(names)}"
-        if best == _clear_minimum(without, as_they_are, *_OF_MIX_UP):
+        if best == _clear_mix_up(without, simple, as_they_are, *_OF_MIX_UP):
             return MovingSilhouettes(as_they_are, tuple(doubts), mix_ups[best].finding(names, shows).sentence)
         doubts.append(f"{shows}: are these videos right?")
     elif as_they_are >= _LEAST_ASKED:
@@ -110,6 +111,17 @@ def _clear_minimum(shares: Sequence[float], as_they_are: float, times: float, ti
     best, another = np.argsort(shares)[:2]
     is_clear = shares[best] * times < as_they_are and shares[best] * times_another < shares[another]
     return int(best) if is_clear and shares[best] < _MOST_UNCOVERED else None
+
+
+def _clear_mix_up(
+    shares: Sequence[float], simple: Sequence[float], as_they_are: float, times: float, times_another: float
+) -> int | None:
+    """Return which share is clear among those of all mix-ups, else among the simple ones, which come first.
+
+    Where two cameras see nearly the same, exchanging one of them is hardly another mix-up than passing on all three.
+    """
+    best = _clear_minimum(shares, as_they_are, times, times_another)
+    return _clear_minimum(simple, as_they_are, times, times_another) if best is None else best
 
 
 def _median_uncovered(moments: Iterable[_Regions]) -> float:
