@@ -81,7 +81,7 @@ def verdict(moments: Sequence[Moment], names: Sequence[str], mix_up: MixUp | Non
 
 
 def _kind(mix_up: MixUp) -> str:
-    return "a mix-up" if len(mix_up.cameras) < 3 else "videos passed on in turn"
+    return "videos passed on in turn" if mix_up.is_in_turn else "a mix-up"
 
 
 def verdicts(scenes: Iterator[Scene]) -> Iterator[tuple[str, str]]:

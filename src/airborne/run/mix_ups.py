@@ -117,9 +117,14 @@ class MixUp:
         """Whether videos are exchanged, of two cameras or of more."""
         return len(self.cameras) > 1
 
+    @property
+    def is_in_turn(self) -> bool:
+        """Whether the videos of three cameras or more are passed on from each to the next."""
+        return len(self.cameras) > 2
+
     def describe(self, names: Sequence[str]) -> str:
         """Return how its images would be right, by the rig's names."""
-        if len(self.cameras) > 2:
+        if self.is_in_turn:
             return f"the images of {self._describe_order(names)}"
         of = join_names([names[i] for i in self.cameras])
         return f"the images of {of} {'exchanged' if self.is_exchange else self._remedy}"
@@ -127,8 +132,8 @@ class MixUp:
     def how(self, names: Sequence[str]) -> str:
         """Return how the first of its cameras agrees, by the rig's names."""
         if self.is_exchange:
-            in_turn = "whose video fits in turn" if len(self.cameras) == 2 else "and so on"
-            return f"in that of {names[self.cameras[1]]}, {in_turn}"
+            others = "and so on" if self.is_in_turn else "whose video fits in turn"
+            return f"in that of {names[self.cameras[1]]}, {others}"
         return f"once it is {self._remedy}"
 
     @property
@@ -176,7 +181,7 @@ class MixUp:
         if self.is_exchange:
             of = f"the videos of {join_names(cameras)}, or their calibrations, are"
             advice = f"{of} exchanged; exchange them back"
-            if len(cameras) > 2:
+            if self.is_in_turn:
                 advice = f"{of} in a wrong order; use that of {self._describe_order(names)}"
             return Finding(kind="swapped", what=what, advice=advice, cameras=cameras)
         if self.is_turned:

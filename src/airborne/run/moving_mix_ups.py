@@ -77,7 +77,7 @@ def compare_silhouettes(moments: Sequence[Moment]) -> MovingSilhouettes:
     mix_ups = [each for each in possible_mix_ups(len(names)) if len({cameras[i].size for i in each.cameras}) == 1]
     without = [_median_uncovered(_undo(mix_up, *each) for each in chosen) for mix_up in mix_ups]
     what = f"{as_they_are:.0%} of the silhouettes of what moves cannot be one body's"
-    simple = without[: sum(len(mix_up.cameras) < 3 for mix_up in mix_ups)]
+    simple = without[: sum(not mix_up.is_in_turn for mix_up in mix_ups)]
     if (best := _clear_mix_up(without, simple, as_they_are, *_OF_DOUBT)) is not None:
         shows = f"{what}, and {without[best]:.0%} with {mix_ups[best].describe(names)}"
         if best == _clear_mix_up(without, simple, as_they_are, *_OF_MIX_UP):
