@@ -1,5 +1,6 @@
 """Which trials a batch runs: folders, patterns, tables; names that would clash; the files of `airborne new`."""
 
+import tomllib
 from fractions import Fraction
 
 import numpy as np
@@ -177,6 +178,34 @@ def test_new_refuses_labels_that_a_batch_would_refuse(tmp_path, pattern):
     with pytest.raises(AirborneError, match=r"\{(trial|folder)\} cannot be a label, .* such as \{number\}"):
         write_study(tmp_path, pattern, tmp_path / "study")
     assert not (tmp_path / "study").exists()
+
+
+@pytest.mark.parametrize(
+    ("names", "trials", "cameras", "said"),
+    [
+        (
+            ("run_1_left", "run_1_right", "run_2_left", "run_2_right"),
+            ["run_1", "run_2"],
+            ["left", "right"],
+            "is read as trial run_1, camera left; if it is tri",
+        ),
+        (
+            ("run_cam_1", "run_cam_2"),
+            ["run"],
+            ["cam_1", "cam_2"],
+            "is read as trial run, camera cam_1; if it is trial r",
+        ),
+    ],
+)
+def test_new_reads_names_with_more_underlines_than_words_as_those_of_few_cameras(
+    tmp_path, names, trials, cameras, said
+):
+    for name in names:
+        write(tmp_path / "videos" / f"{name}.mp4", "")
+    study = write_study(tmp_path / "videos", "{trial}_{camera}.mp4", tmp_path / "study", body="legs")
+    assert [path.stem for path in study.trials] == trials
+    assert f"{names[0]}.mp4 {said}" in study.notes[0]
+    assert [table["name"] for table in tomllib.loads(study.session.read_text())["camera"]] == cameras
 
 
 def test_new_leaves_files_that_exist_alone(tmp_path):

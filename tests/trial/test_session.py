@@ -34,9 +34,21 @@ def test_two_lines_are_a_trial(tmp_path):
     trial = read_trial(write(tmp_path, 'labels = { athlete = "anna", condition = "dry", number = 3 }'))
     assert trial.name == "throw_3"
     assert trial.camera[0].video == "videos/anna_throw_3_left.mp4"
-    assert trial.path(trial.camera[0].video).resolve() == tmp_path / "videos" / "anna_throw_3_left.mp4"
+    assert trial.path(trial.camera[0].video) == tmp_path / "videos" / "anna_throw_3_left.mp4"
     assert trial.body.file == "body.toml"
     assert trial.labels == {"athlete": "anna", "condition": "dry", "number": 3}
+
+
+def test_paths_beside_a_session_behind_a_link_stay_as_they_are(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "study" / "trials").mkdir(parents=True)
+    path = write(tmp_path / "study", 'labels = { athlete = "anna" }')
+    path.parent.rename(tmp_path / "elsewhere" / "trials")
+    (tmp_path / "study" / "session.toml").rename(tmp_path / "elsewhere" / "session.toml")
+    (tmp_path / "elsewhere" / "calib.toml").touch()
+    (tmp_path / "elsewhere" / "body.toml").touch()
+    path.parent.symlink_to(tmp_path / "elsewhere" / "trials")
+    assert read_trial(path).path("calib.toml") == path.parent / ".." / "calib.toml"
 
 
 def test_an_athletes_tables_stand_between_the_trials_and_the_sessions(tmp_path):

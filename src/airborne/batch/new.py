@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ _LEGS = "legs"  # the preset of several players
 _PERSON = "human18"  # that of a person, of whom stature and mass are to be added
 _PRESETS = (_LEGS, _PERSON)
 _WORD = re.compile(r"\{(\w+)\}")
+_ByTrial = dict[tuple[str, ...], dict[str, Path]]  # the videos of each camera, by the values of the labels
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,8 @@ def write_study(
             f"pattern {pattern}: {{{own[0]}}} cannot be a label, as a batch's table has a column of that name; call it "
             "otherwise, such as {number}"
         )
-    found = _match(videos, pattern)
+    notes: list[str] = []
+    found = _match(videos, pattern, notes)
     if not found:
         names = sorted(path.relative_to(videos).as_posix() for path in videos.rglob("*") if path.is_file())
         there = f"it holds {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" if names else "it is empty"
@@ -71,7 +73,6 @@ def write_study(
     from_session = Path(os.path.relpath(videos.absolute(), folder.absolute())).as_posix()
     session = folder / SESSION
     files: list[Path] = []
-    notes: list[str] = []
     unread: list[str] = []
     tables = [
         {"name": name, "video": f"{from_session}/{pattern}".replace(f"{{{_CAMERA}}}", name)}
@@ -101,24 +102,39 @@ def write_study(
     return NewStudy(session, tuple(files), tuple(notes))
 
 
-def _match(videos: Path, pattern: str) -> dict[tuple[str, ...], dict[str, Path]]:
-    """Return the videos of each trial, by the values of its labels and by camera."""
-    parts = _WORD.split(pattern)
-    form = "".join(f"(?P<{part}>[^/]+?)" if k % 2 else re.escape(part) for k, part in enumerate(parts))
-    found: dict[tuple[str, ...], dict[str, Path]] = {}
-    for path in sorted(each for each in videos.rglob("*") if each.is_file()):
-        fits = re.fullmatch(form, path.relative_to(videos).as_posix())
-        if fits is None:
-            continue
-        values = fits.groupdict()
-        camera = values.pop(_CAMERA)
+def _match(videos: Path, pattern: str, notes: list[str]) -> _ByTrial:
+    """Return the videos of each trial, by the values of its labels and by camera.
+
+    Where a word holds what divides words, names can be read in two ways: each word as short as can be, or as long. The
+    one with fewer cameras is taken, and noted.
+    """
+    paths = {path.relative_to(videos).as_posix(): path for path in sorted(videos.rglob("*")) if path.is_file()}
+    short, long = (_read_names(paths, pattern, repeat) for repeat in ("+?", "+"))
+    readings = (
+        [short] if short == long else sorted((short, long), key=lambda read: len({v[_CAMERA] for v in read.values()}))
+    )
+    if len(readings) > 1:
+        name = next(name for name, values in short.items() if values != long[name])
+        first, other = (", ".join(f"{word} {value}" for word, value in read[name].items()) for read in readings)
+        notes.append(f"{name} is read as {first}; if it is {other}, let something else stand between the words")
+    found: _ByTrial = {}
+    for name, values in readings[0].items():
         try:
-            for value in (camera, *values.values()):
+            for value in values.values():
                 check_column(value)
         except ValueError as error:
-            raise AirborneError(f"{path}: {error}") from None
-        found.setdefault(tuple(values.values()), {})[camera] = path
+            raise AirborneError(f"{paths[name]}: {error}") from None
+        labels = tuple(value for word, value in values.items() if word != _CAMERA)
+        found.setdefault(labels, {})[values[_CAMERA]] = paths[name]
     return found
+
+
+def _read_names(names: Iterable[str], pattern: str, repeat: str) -> dict[str, dict[str, str]]:
+    """Return the words of each name that fits a pattern, of characters repeated as `repeat` says."""
+    parts = _WORD.split(pattern)
+    form = "".join(f"(?P<{part}>[^/]{repeat})" if k % 2 else re.escape(part) for k, part in enumerate(parts))
+    fits = {name: re.fullmatch(form, name) for name in names}
+    return {name: fit.groupdict() for name, fit in fits.items() if fit is not None}
 
 
 def _fields(found: Mapping[tuple[str, ...], Mapping[str, Path]], camera: str, notes: list[str]) -> dict[str, str]:

@@ -14,7 +14,7 @@ from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_
 from airborne.body import SAMPLED, BodyModel, human18, human18_from_measurements
 from airborne.body.files import read_body
 from airborne.errors import MOST_SAID, MistakesError, TrialError, list_mistakes
-from airborne.io.names import ColumnName, Name, check_path
+from airborne.io.names import ColumnName, Name
 from airborne.io.text import list_keys, read_toml
 from airborne.tracking.methods import Settings
 from airborne.trial.body import BodyTable
@@ -23,7 +23,7 @@ from airborne.trial.cameras import CameraTable
 from airborne.trial.keys import KeyTable
 from airborne.trial.lights import LightsTable
 from airborne.trial.masks import MaskTable
-from airborne.trial.session import join_session
+from airborne.trial.session import join_session, session_path
 from airborne.trial.settings import (
     BODY_METHODS,
     KEY_METHODS,
@@ -216,10 +216,7 @@ def read_tables(path: Path) -> tuple[dict[str, Any], Path]:
     tables = _read_toml(path)
     if "session" not in tables:
         return tables, path.parent
-    try:
-        session = path.parent / check_path(tables["session"])
-    except (AttributeError, ValueError):
-        raise TrialError(f"{path.name}: session: expected the path of a session's TOML file") from None
+    session = session_path(tables["session"], path)
     return join_session(tables, _read_toml(session), path), session.parent
 
 

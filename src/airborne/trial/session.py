@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from airborne.errors import TrialError
+from airborne.io.names import check_path
 
 _LONGEST_WORD = 80  # characters of a label, which a session may repeat
 _PLACE = re.compile(r"\{([^{}]*)\}")  # in a text of a session: {athlete}
+
+
+def session_path(name: Any, path: Path) -> Path:
+    """Return the path of the session that the trial of a file `path` names, without the dots that it can do without.
+
+    Raises TrialError where the name is none of a file.
+    """
+    try:
+        session = path.parent / check_path(name)
+    except (AttributeError, ValueError):
+        raise TrialError(f"{path.name}: session: expected the path of a session's TOML file") from None
+    plain = Path(os.path.normpath(session))  # names another file where a folder is a link
+    return plain if plain.exists() and session.exists() and plain.samefile(session) else session
 
 
 def join_session(tables: dict[str, Any], session: dict[str, Any], path: Path) -> dict[str, Any]:
