@@ -25,7 +25,8 @@ from airborne.body import BodyModel
 from airborne.motion import Motion, landmarks
 from airborne.motion.files import read_motion
 from airborne.motion.run_folder import TRACKED_MOTION, read_body_run
-from airborne.motion.smoothing.smoother import Smoothing, smooth_landmarks, smooth_root
+from airborne.motion.smoothing.settings import Smoothing
+from airborne.motion.smoothing.smoother import smooth_landmarks, smooth_root
 from airborne.run.track import track_trial
 from airborne.synthetic import write_somersault
 from airborne.synthetic.flight.somersault import SomersaultPreset
@@ -52,13 +53,20 @@ def measure(name: str, folder: Path, run: Path) -> list[dict]:
     ]
     for method, each in {"kalman": motion, "whole run, kalman": fitted}.items():
         joints, root = smooth_landmarks(each, model, _KALMAN, []), smooth_root(each, model, _KALMAN, [])
-        smooth, sd = (joints[key].to_numpy()[:, : len(model.landmarks)] for key in ("position", "position_sd"))
+        smooth, sd, v, v_sd, a, a_sd = (
+            joints[f"{key}{end}"].to_numpy()[:, : len(model.landmarks)]
+            for key in ("position", "velocity", "acceleration")
+            for end in ("", "_sd")
+        )
+        true_v, true_a = _derivatives(motion.time_s, truth.points)
         w, w_sd = root["angular_velocity"].to_numpy(), root["angular_velocity_sd"].to_numpy()[:, None]
         all_mm, free_mm = truth.mean_mm(each, smooth)
         found = {
             "joints, against tracked": (_change(all_mm, tracked_mm[0]), -15),
             "without offset, against tracked": (_change(free_mm, tracked_mm[1]), -15),
             "joints within 2 sd": (_share(smooth - truth.points, sd), "88..99"),
+            "velocities of joints within 2 sd": (_share(v - true_v, v_sd), "88..99"),
+            "accelerations of joints within 2 sd": (_share(a - true_a, a_sd), "88..99"),
             "angular velocity, against tracked": (_change(_rms(w - true_w), tracked_w), -40),
             "angular velocity within 2 sd": (_share(w - true_w, w_sd), "88..99"),
         }
@@ -121,6 +129,15 @@ def _true_rates(folder: Path, time_s: Array) -> Array:
         R = np.array([[float(row[f"r{i}{j}"]) for i in range(3) for j in range(3)] for row in rows]).reshape(-1, 3, 3)
     true_s = np.array([float(row["time_s"]) for row in rows])
     return _rates(true_s, R)[np.abs(true_s[:, None] - time_s).argmin(axis=0)]
+
+
+def _derivatives(time_s: Array, points: Array) -> tuple[Array, Array]:
+    """Return velocities and accelerations of even paths (n, joints, 3) by central differences; NaN at ends."""
+    velocity, acceleration = np.full((2, *points.shape), np.nan)
+    step_s = float(np.median(np.diff(time_s)))
+    velocity[1:-1] = (points[2:] - points[:-2]) / (2 * step_s)
+    acceleration[1:-1] = (points[2:] - 2 * points[1:-1] + points[:-2]) / step_s**2
+    return velocity, acceleration
 
 
 def _rates(time_s: Array, R: Array) -> Array:

@@ -9,7 +9,7 @@ import pytest
 from airborne.cameras import read_rig
 from airborne.errors import ResultError
 from airborne.motion.run_folder import read_body_run, videos_of
-from airborne.motion.smoothing.smoother import Smoothing
+from airborne.motion.smoothing.settings import Smoothing
 from airborne.run.key_misses import far_keys
 from airborne.run.smooth import smooth_run
 from airborne.run.track import track_trial

@@ -11,7 +11,7 @@ import trimesh
 
 from airborne.errors import ResultError, VideoError
 from airborne.io.folder_lock import LOCK, sole_writer
-from airborne.motion.smoothing.smoother import Smoothing
+from airborne.motion.smoothing.settings import Smoothing
 from airborne.run.identity import input_hashes
 from airborne.run.smooth import smooth_run
 from airborne.run.track import track_trial

@@ -10,7 +10,7 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.motion import MotionWriter
-from airborne.motion.smoothing.smoother import Smoothing
+from airborne.motion.smoothing.settings import Smoothing
 from airborne.run.smooth import smooth_run
 from tests.cli.test_cli import in_process, refusal
 from tests.support.docs import DOCS, named, table_of

@@ -12,7 +12,7 @@ from airborne.cli.console import Json, errors, progress
 from airborne.errors import ResultError
 
 if TYPE_CHECKING:
-    from airborne.motion.smoothing.smoother import Smoothing
+    from airborne.motion.smoothing.settings import Smoothing
 
 
 def smooth_command(
@@ -58,7 +58,7 @@ def smooth_command(
 def _smoothing(
     butterworth: str | None, *, spline: bool, kalman: bool, fill_s: float, resample_hz: float | None
 ) -> Smoothing:
-    from airborne.motion.smoothing.smoother import Smoothing
+    from airborne.motion.smoothing.settings import Smoothing
 
     if (butterworth is not None) + spline + kalman != 1:
         raise ResultError("give one way to smooth: --butterworth 6, --butterworth auto, --spline or --kalman")

@@ -32,7 +32,7 @@ from airborne.interface.arguments import (
     to_times,
 )
 from airborne.io.names import to_path
-from airborne.motion.smoothing.smoother import Smoothing
+from airborne.motion.smoothing.settings import Smoothing
 from airborne.run.evaluate import AgreementReport, Comparison, assess, evaluate_agreement
 from airborne.run.export import EXPORT_FORMATS, ExportResult
 from airborne.run.export import export_run as write_export

@@ -27,8 +27,8 @@ from airborne.motion.run_folder import (
 )
 from airborne.motion.smoothing import ResidualAnalysis, is_evenly_sampled, residual_analysis
 from airborne.motion.smoothing.segments import MIN_FRAMES, finite_rows, segment_numbers, stretches
+from airborne.motion.smoothing.settings import Smoothing
 from airborne.motion.smoothing.smoother import (
-    Smoothing,
     smooth_joint_angles,
     smooth_landmarks,
     smooth_players,

@@ -7,7 +7,6 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from airborne.errors import ResultError
-from airborne.motion.free_fall import GENERIC_NOISE, noise_covariance
 from airborne.motion.smoothing import (
     butterworth_smoother,
     cutoff_correction,
@@ -16,6 +15,7 @@ from airborne.motion.smoothing import (
     pass_cutoff_hz,
     smooth_stretches,
 )
+from airborne.motion.smoothing.kalman import error_correlations, path_errors
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED, sampled
 
 RATE = 60.0
@@ -115,8 +115,12 @@ def test_stated_deviations_are_those_of_many_draws():
     rng, t, runs = np.random.default_rng(2), times(40), 800
     sd = np.linspace(1.0, 3.0, 40)
     covariance = (sd**2)[:, None, None] * np.ones((1, 1, 1))
-    noise = np.linalg.cholesky(noise_covariance(t, sd**2, noise=GENERIC_NOISE)) @ rng.standard_normal((40, runs))
-    stated = butterworth_smoother(t, noise[:, :1], covariance, cutoff_hz=6)
+    path = rng.standard_normal((40, 1))
+    stated = butterworth_smoother(t, path, covariance, cutoff_hz=6)
+    errors = path_errors(t, path, covariance, are_slow=False)
+    assert errors is not None
+    fast, _ = error_correlations(t, errors.white_share)
+    noise = sd[:, None] * np.linalg.cholesky(fast) @ rng.standard_normal((40, runs))
     many = butterworth_smoother(t, noise, np.full((40, runs, runs), np.nan), cutoff_hz=6)
     for name in ("value", "velocity", "acceleration"):
         ratio = getattr(many, name).std(axis=1) / getattr(stated, f"{name}_sd")[:, 0]

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from airborne.body.human import human18
 from airborne.geometry.rotations import angles_from_matrix, geodesic, matrix_from_angles
 from airborne.motion.smoothing import smoother
-from airborne.motion.smoothing.smoother import Smoothing, smooth_root
+from airborne.motion.smoothing.settings import Smoothing
+from airborne.motion.smoothing.smoother import smooth_root
 from airborne.synthetic.flight.articulated import Takeoff, fly_articulated, joint_motion
 from tests.support.motions import motion_of
 from tests.support.tolerances import SOLVED

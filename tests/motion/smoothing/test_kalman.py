@@ -1,19 +1,21 @@
 """The Kalman smoother: a dense Gaussian solve gives the same, free fall is recovered, its deviations are honest."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from airborne.motion.smoothing import kalman_smoother
+from airborne.motion.smoothing import butterworth_smoother, kalman_smoother, spline_smoother
 from airborne.motion.smoothing.kalman import (
     ERROR_S,
     PRIOR_SD,
-    kalman_filter,
+    error_correlations,
     maximum_likelihood,
     measurement_noise,
-    rts_smoother,
     state_space_model,
 )
+from airborne.motion.smoothing.state_space import kalman_filter, rts_smoother
 from tests.support.tolerances import ROUNDTRIP
 
 RATE, WHITE_SHARE = 60.0, 0.2
@@ -79,8 +81,9 @@ def test_axes_that_do_not_share_noise_are_smoothed_as_if_alone():
     t, z, variance = problem()
     both, own = np.stack([z, z], axis=1), measurement_noise(variance[:, None, None])
     shared = measurement_noise(variance[:, None, None] * np.eye(2))
-    density, share = maximum_likelihood(t, z[:, None], own)
-    assert maximum_likelihood(t, both, shared) == pytest.approx((density, share), rel=0.1)
+    density, fast_share, share = maximum_likelihood(t, z[:, None], own, are_slow=True)
+    alike = pytest.approx((density, fast_share, share), rel=0.1)
+    assert maximum_likelihood(t, both, shared, are_slow=True) == alike
     alone = rts_smoother(state_space_model(t, z[:, None], own, density, white_share=share), z[:, None])[0]
     together = rts_smoother(state_space_model(t, both, shared, density, white_share=share), both)[0]
     assert together[:, :4:2] == pytest.approx(alone[:, :2], abs=ROUNDTRIP)
@@ -90,7 +93,8 @@ def test_axes_that_do_not_share_noise_are_smoothed_as_if_alone():
 def test_the_strength_of_the_jerk_is_the_likeliest_with_errors_of_the_likeliest_size(factor, scales):
     t, z, variance = problem()
     variance *= factor
-    density, share = maximum_likelihood(t, z[:, None], measurement_noise(variance[:, None, None]))
+    density, fast_share, share = maximum_likelihood(t, z[:, None], measurement_noise(variance[:, None, None]))
+    assert fast_share == 1, "of errors that are not slow"
     costs = [
         min(-dense(t, z, scale * variance, times * scale * density, share)[2] for scale in scales)
         for times in (0.3, 1.0, 3.0)
@@ -140,6 +144,27 @@ def test_deviations_are_correct_for_paths_of_the_model():
         ratios["velocity"].append((result.velocity[:, 0] - truth[:, 1]) / result.velocity_sd[:, 0])
     for ratio in ratios.values():
         assert np.sqrt(np.mean(np.square(ratio))) == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    "smoother",
+    [kalman_smoother, spline_smoother, partial(butterworth_smoother, cutoff_hz=8)],
+    ids=["kalman", "spline", "8 Hz"],
+)
+def test_slow_errors_pass_into_the_result_and_its_deviations(smoother):
+    rng, n, sd, fast_share = np.random.default_rng(7), 60, 0.02, 0.002
+    t = np.arange(n) / RATE
+    _, slow = error_correlations(t, 0.0)
+    root = np.linalg.cholesky(slow + 1e-9 * np.eye(n))
+    ratios = []
+    for _ in range(30):
+        error = sd * (np.sqrt(1 - fast_share) * root @ rng.normal(size=n) + np.sqrt(fast_share) * rng.normal(size=n))
+        stated = np.full((n, 1, 1), sd**2)
+        result = smoother(t, (2 * t + error)[:, None], stated, are_errors_slow=True)
+        errors = result.value[:, 0] - 2 * t, result.velocity[:, 0] - 2, result.acceleration[:, 0]
+        sds = result.value_sd, result.velocity_sd, result.acceleration_sd
+        ratios.append([each[4:-4] / of_it[4:-4, 0] for each, of_it in zip(errors, sds, strict=True)])
+    assert np.sqrt(np.mean(np.square(ratios), axis=(0, 2))) == pytest.approx(np.ones(3), abs=0.25)
 
 
 def test_a_direction_that_nothing_shows_rests_on_the_others():

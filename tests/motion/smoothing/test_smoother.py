@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from airborne.errors import ResultError
 from airborne.geometry.rotations import geodesic
 from airborne.motion import Motion
+from airborne.motion.smoothing.settings import Smoothing
 from airborne.motion.smoothing.smoother import (
     CENTRE_OF_MASS,
-    Smoothing,
     smooth_joint_angles,
     smooth_landmarks,
     smooth_players,
@@ -176,4 +176,4 @@ def test_what_makes_no_sense_is_refused(wrong, message):
     with pytest.raises(ResultError, match=message):
         Smoothing(**wrong)
     with pytest.raises(ResultError, match="needs a cut-off"):
-        Smoothing(method="butterworth").smoother()
+        Smoothing(method="butterworth").smoother(has_joints=True)

@@ -81,7 +81,13 @@ def is_evenly_sampled(time_s: Array) -> bool:
 
 
 def butterworth_smoother(
-    time_s: Array, values: Array, covariance: Array, *, cutoff_hz: float, resample_hz: float | None = None
+    time_s: Array,
+    values: Array,
+    covariance: Array,
+    *,
+    cutoff_hz: float,
+    resample_hz: float | None = None,
+    are_errors_slow: bool = False,
 ) -> SmoothedPaths:
     """Smooth one stretch (n, k) with a zero-lag Butterworth filter; see `Smoother`.
 
@@ -98,7 +104,7 @@ def butterworth_smoother(
         even = values if is_complete else CubicSpline(known_s, values)(inside_s)
         return _with_derivatives(inside_s, low_pass(even, cutoff_hz=cutoff_hz, rate_hz=rate_hz), at_s)
 
-    return apply_operator(operator, time_s, values, covariance)
+    return apply_operator(operator, time_s, values, covariance, are_errors_slow=are_errors_slow)
 
 
 def _with_derivatives(even_s: Array, filtered: Array, at_s: Array) -> Array:

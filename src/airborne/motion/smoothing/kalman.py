@@ -1,14 +1,16 @@
 """Kalman smoother: a white-jerk path and a tracker's errors, whose sizes the path itself shows, by maximum likelihood.
 
 Each path obeys d3x/dt3 = white noise of density q, the same on all axes. A measurement is the path plus the tracker's
-error: its covariance as stated, times one number up to 1, part of it white and the rest a process of its own, a Matern
-process of order 3/2 over 0.05 s: trackers' errors are smooth. Stated covariances are bounds, often several times too
-wide, so only their course in time and direction is believed. What smoothing does depends on q over that number, which
-is concentrated out of the likelihood: Harvey 1989, "Forecasting, structural time series models and the Kalman filter",
-section 3.4. The states are smoothed after Rauch, Tung and Striebel 1965, "Maximum likelihood estimates of linear
-dynamic systems"; white jerk: Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and Navigation",
-section 6.2; Matern processes as states: Hartikainen and Sarkka 2010, "Kalman filtering and smoothing solutions to
-temporal Gaussian process regression models".
+fast error: its covariance as stated, times one number up to 1, part of it white and the rest a process of its own, a
+Matern process of order 3/2 over 0.05 s. What smoothing does depends on q over that number, which is concentrated out of
+the likelihood: Harvey 1989, "Forecasting, structural time series models and the Kalman filter", section 3.4. The rest
+of the stated covariance is slow: no smoother tells it from motion, so it stays in the result. People's errors are slow,
+as their bodies' shapes give them; those of a thing without joints come from its images: all are fast.
+
+White jerk: Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and Navigation", section 6.2;
+Matern processes as states: Hartikainen and Sarkka 2010, "Kalman filtering and smoothing solutions to temporal Gaussian
+process regression models"; derivatives of a Gaussian process: Rasmussen and Williams 2006, "Gaussian Processes for
+Machine Learning", section 9.4.
 """
 
 from __future__ import annotations
@@ -16,58 +18,85 @@ from __future__ import annotations
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, minimize_scalar
 
-from airborne.kernels import kernel
-from airborne.kernels.arrays import assign
 from airborne.motion.smoothing.segments import MIN_FRAMES, SmoothedPaths, finite_rows
+from airborne.motion.smoothing.state_space import StateSpaceModel, kalman_filter, rts_smoother
 from airborne.types import Array
 
 PRIOR_SD = (10.0, 100.0, 1000.0)  # of value, velocity, acceleration at first [unit, unit/s, ...], over scale: weak
 # of the smooth errors' correlation, chosen on synthetic somersaults 71 and 72: with 0.03 s less is smoothed, with
 # 0.07 s joints of a pike err more
 ERROR_S = 0.05
+# of the slow errors' correlation, a Gaussian's sd; chosen on synthetic somersaults 901 to 904: there velocities are
+# within their sds as often as positions are
+SLOW_S = 0.12
+_SLOW_DERIVATIVES = np.array([1.0, 1 / SLOW_S**2, 3 / SLOW_S**4])  # variances of such a process and its derivatives
 _WHITE_SHARES = (0.003, 0.03, 0.3)  # of the error's variance, that are tried
 _LOG_DENSITY = (-6.0, 12.0)  # search range: powers of ten of q over the scale of the errors [unit2/s5]
 _LOG_STEP = 0.02  # tolerance of the search, powers of ten
 _UNOBSERVED_SD = 0.15  # [unit] of a direction with an infinite variance: `tracking.covariance` states none beyond
 _WHITE_JERK = np.array([[20.0, 8.0, 6.0], [8.0, 3.0, 2.0], [6.0, 2.0, 1.0]])  # divisors of its discrete noise
+_FEWEST = 3  # rows that tell a path with an acceleration
 _LEAST_VARIANCE = 1e-12  # [unit2] keeps roots and logarithms finite
 
 
-class StateSpaceModel(NamedTuple):
-    """A linear Gaussian model of n times: x' = F x + noise Q, z = H x + noise R; NaN rows of z are missing."""
-
-    F: Array  # (n - 1, d, d)
-    Q: Array  # (n - 1, d, d)
-    H: Array  # (n, k, d)
-    R: Array  # (n, k, k)
-    mean: Array  # (d,) of the first state
-    P: Array  # (d, d)
-
-
-def kalman_smoother(time_s: Array, values: Array, covariance: Array) -> SmoothedPaths:
+def kalman_smoother(time_s: Array, values: Array, covariance: Array, *, are_errors_slow: bool = False) -> SmoothedPaths:
     """Smooth one stretch (n, k) with the Kalman smoother; see `Smoother`.
 
     A row whose covariance is unknown counts as missing; an infinite variance as that of 0.15 units. NaN if no
-    covariance is known. Missing rows are predicted from both sides. The standard deviations are those of the stated
-    covariances.
+    covariance is known. Missing rows are predicted from both sides. The standard deviations are those of the fast
+    errors after smoothing, and of the slow ones.
     """
-    noise = measurement_noise(covariance)
-    is_measured = finite_rows(values) & finite_rows(noise.root.reshape(len(values), -1))
-    if is_measured.sum() < 3:
+    measured = _measured(values, covariance)
+    if measured is None:
         return SmoothedPaths.unknown(values.shape)
-    values = np.where(is_measured[:, None], values, np.nan)
-    noise = noise._replace(root=np.where(is_measured[:, None, None], noise.root, np.eye(values.shape[1])))
-    density, white_share = maximum_likelihood(time_s, values, noise)
-    mean, P = rts_smoother(state_space_model(time_s, values, noise, density, white_share=white_share), values)
+    values, noise = measured
+    errors = maximum_likelihood(time_s, values, noise, are_slow=are_errors_slow)
+    model = state_space_model(time_s, values, noise, errors.density, white_share=errors.white_share)
+    mean, P = rts_smoother(model, values)
     n, k = values.shape
     per_unit = _period(time_s) ** -np.arange(3.0)
     value = mean[:, : 3 * k].reshape(n, 3, k) * per_unit[:, None]
-    variance = np.diagonal(P, axis1=1, axis2=2)[:, : 3 * k].reshape(n, 3, k)
-    sd = np.sqrt(np.maximum(variance, 0.0)) * per_unit[:, None]
+    fast = errors.fast_share * np.diagonal(P, axis1=1, axis2=2)[:, : 3 * k].reshape(n, 3, k) * per_unit[:, None] ** 2
+    stated = np.diagonal(noise.root @ noise.root, axis1=1, axis2=2) + noise.unobserved
+    rows = np.flatnonzero(finite_rows(values))  # in gaps slow errors are as between their ends
+    stated = np.stack([np.interp(np.arange(n), rows, each[rows]) for each in stated.T], axis=1)
+    slow = (1 - errors.fast_share) * stated[:, None] * _SLOW_DERIVATIVES[:, None]
+    sd = np.sqrt(np.maximum(fast, 0.0) + slow)
     return SmoothedPaths(value[:, 0], value[:, 1], value[:, 2], sd[:, 0], sd[:, 1], sd[:, 2])
+
+
+def _measured(values: Array, covariance: Array) -> tuple[Array, MeasurementNoise] | None:
+    """Return values (n, k), NaN where they or their errors are unknown, and the errors; None of fewer than three."""
+    noise = measurement_noise(covariance)
+    is_measured = finite_rows(values) & finite_rows(noise.root.reshape(len(values), -1))
+    if is_measured.sum() < _FEWEST:
+        return None
+    root = np.where(is_measured[:, None, None], noise.root, np.eye(values.shape[1]))
+    return np.where(is_measured[:, None], values, np.nan), noise._replace(root=root)
+
+
+def path_errors(time_s: Array, values: Array, covariance: Array, *, are_slow: bool) -> PathErrors | None:
+    """Return the likeliest errors of a path (n, k); None where hardly any of its covariances is known."""
+    measured = _measured(values, covariance)
+    return None if measured is None else maximum_likelihood(time_s, *measured, are_slow=are_slow)
+
+
+class PathErrors(NamedTuple):
+    """A path's jerk and its tracker's fast errors, as likely as can be."""
+
+    density: float  # [unit2/s5] of the white jerk, over the fast share
+    fast_share: float  # of the stated variance
+    white_share: float  # of that share
+
+
+def error_correlations(time_s: Array, white_share: float) -> tuple[Array, Array]:
+    """Return the correlations of a tracker's fast errors and of its slow ones at times (n,): two (n, n)."""
+    lag_s = np.abs(time_s[:, None] - time_s)
+    x = np.sqrt(3) * lag_s / ERROR_S
+    fast = white_share * np.eye(len(time_s)) + (1 - white_share) * (1 + x) * np.exp(-x)
+    return fast, np.exp(-((lag_s / SLOW_S) ** 2) / 2)
 
 
 class MeasurementNoise(NamedTuple):
@@ -88,8 +117,10 @@ def measurement_noise(covariance: Array) -> MeasurementNoise:
     return MeasurementNoise(root, np.where(is_unobserved, _UNOBSERVED_SD**2, 0.0))
 
 
-def maximum_likelihood(time_s: Array, values: Array, noise: MeasurementNoise) -> tuple[float, float]:
-    """Return the likeliest density of the white jerk over the errors' scale [unit2/s5], and their white share.
+def maximum_likelihood(time_s: Array, values: Array, noise: MeasurementNoise, *, are_slow: bool = False) -> PathErrors:
+    """Return the likeliest density of the white jerk, size of the fast errors, and their white share.
+
+    Unless some are slow all errors are fast.
 
     Rows that are not observed in all directions only count where there are hardly others.
     """
@@ -97,20 +128,25 @@ def maximum_likelihood(time_s: Array, values: Array, noise: MeasurementNoise) ->
     values = observed if finite_rows(observed).sum() >= MIN_FRAMES else values
     n_values = max(int(np.isfinite(values).sum()) - 3 * values.shape[1], 1)  # less what the weak first state takes
 
-    def cost(log_density: float, white_share: float) -> float:
+    def fit(log_density: float, white_share: float) -> tuple[float, float]:
+        """Return -2 log-likelihood and the likeliest fast share, no larger than stated."""
         model = state_space_model(time_s, values, noise, 10.0**log_density, white_share=white_share)
-        fit = kalman_filter(model, values)
-        scale = np.clip(fit.squares / n_values, _LEAST_VARIANCE, 1.0)  # the likeliest that is no larger than stated
-        return n_values * np.log(scale) + fit.squares / scale + fit.log_determinant
+        result = kalman_filter(model, values)
+        share = float(np.clip(result.squares / n_values, _LEAST_VARIANCE, 1.0))
+        return n_values * np.log(share) + result.squares / share + result.log_determinant, share
 
     ends = []
-    for share in _WHITE_SHARES:
+    for white_share in _WHITE_SHARES:
         found = minimize_scalar(
-            cost, bounds=_LOG_DENSITY, args=(share,), method="bounded", options={"xatol": _LOG_STEP}
+            lambda x, share=white_share: fit(x, share)[0],
+            bounds=_LOG_DENSITY,
+            method="bounded",
+            options={"xatol": _LOG_STEP},
         )
         result = cast(OptimizeResult, found)
-        ends.append((float(result.fun), 10.0 ** float(result.x), share))
-    return min(ends)[1:]
+        ends.append((float(result.fun), float(result.x), white_share))
+    _, log_density, white_share = min(ends)
+    return PathErrors(10.0**log_density, fit(log_density, white_share)[1] if are_slow else 1.0, white_share)
 
 
 def state_space_model(
@@ -148,100 +184,6 @@ def state_space_model(
         mean=np.concatenate([first, np.zeros(4 * k)]),
         P=np.asarray(np.kron(np.diag(prior_variance), one), float),
     )
-
-
-class FilterResult(NamedTuple):
-    """What the Kalman filter leaves; -2 log-likelihood is squares + log_determinant + a constant."""
-
-    predicted: Array  # (n, d) means before each measurement
-    P_predicted: Array  # (n, d, d)
-    mean: Array  # (n, d) after it
-    P: Array  # (n, d, d)
-    squares: float  # of the innovations, over their variances
-    log_determinant: float  # of these
-
-
-def kalman_filter(model: StateSpaceModel, values: Array) -> FilterResult:
-    """Run the Kalman filter. Measurements are whitened first, so that a row's numbers are processed one at a time."""
-    root = np.linalg.cholesky(model.R)
-    H = np.linalg.solve(root, model.H)
-    white = np.linalg.solve(root, values[..., None])[..., 0]
-    is_measured = finite_rows(values)
-    results = _filter_kernel(model.F, model.Q, H, white, is_measured, model.mean, model.P)
-    before, P_before, mean, P, squares, logs = results
-    whitened = 2 * np.log(np.diagonal(root, axis1=1, axis2=2)[is_measured]).sum()
-    return FilterResult(before, P_before, mean, P, float(squares), float(logs + whitened))
-
-
-@kernel
-def _filter_kernel(
-    F: Array, Q: Array, H: Array, z: Array, is_measured: NDArray[np.bool_], mean: Array, P: Array
-) -> tuple[Array, Array, Array, Array, float, float]:
-    n, k, d = H.shape
-    before, after = np.empty((n, d)), np.empty((n, d))
-    P_before, P_after = np.empty((n, d, d)), np.empty((n, d, d))
-    mean, P, Ph, squares, logs = mean.copy(), P.copy(), np.empty(d), 0.0, 0.0
-    for i in range(n):
-        if i:
-            mean = _predict_mean(F[i - 1], mean)
-            P = _predict_covariance(F[i - 1], P, Q[i - 1])
-        assign(before[i], mean)
-        assign(P_before[i], P)
-        if is_measured[i]:
-            for j in range(k):
-                S, error = 1.0, z[i, j]
-                for a in range(d):
-                    Ph[a] = 0.0
-                    for b in range(d):
-                        Ph[a] += P[a, b] * H[i, j, b]
-                    S += H[i, j, a] * Ph[a]
-                    error -= H[i, j, a] * mean[a]
-                for a in range(d):
-                    mean[a] += Ph[a] * error / S
-                    for b in range(d):
-                        P[a, b] -= Ph[a] * Ph[b] / S
-                squares += error * error / S
-                logs += np.log(S)
-        assign(after[i], mean)
-        assign(P_after[i], P)
-    return before, P_before, after, P_after, squares, logs
-
-
-@kernel(is_inner=True)
-def _predict_mean(F: Array, mean: Array) -> Array:
-    predicted = np.zeros_like(mean)
-    for a in range(len(mean)):
-        for b in range(len(mean)):
-            predicted[a] += F[a, b] * mean[b]
-    return predicted
-
-
-@kernel(is_inner=True)
-def _predict_covariance(F: Array, P: Array, Q: Array) -> Array:
-    """Return F P F' + Q."""
-    d = len(P)
-    half, predicted = np.zeros_like(P), Q.copy()
-    for a in range(d):
-        for b in range(d):
-            if F[a, b] != 0.0:
-                for c in range(d):
-                    half[a, c] += F[a, b] * P[b, c]
-    for a in range(d):
-        for b in range(d):
-            if F[a, b] != 0.0:
-                for c in range(d):
-                    predicted[c, a] += half[c, b] * F[a, b]
-    return predicted
-
-
-def rts_smoother(model: StateSpaceModel, values: Array) -> tuple[Array, Array]:
-    """Run the filter forward and the Rauch-Tung-Striebel smoother backward: means (n, d), covariances (n, d, d)."""
-    predicted, P_predicted, mean, P, _, _ = kalman_filter(model, values)
-    for i in range(len(values) - 2, -1, -1):
-        gain = np.linalg.solve(P_predicted[i + 1], model.F[i] @ P[i]).T
-        mean[i] += gain @ (mean[i + 1] - predicted[i + 1])
-        P[i] += gain @ (P[i + 1] - P_predicted[i + 1]) @ gain.T
-    return mean, P
 
 
 def _for_each_axis(small: Array, one: Array) -> Array:

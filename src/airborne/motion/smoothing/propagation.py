@@ -1,7 +1,6 @@
-"""Propagation of noise through a linear smoother, from its exact coefficients.
+"""Propagation of a tracker's errors through a linear smoother, from its exact coefficients.
 
-Half of each variance is white and half correlated over 0.1 s (`motion.free_fall.GENERIC_NOISE`): errors of
-neighbouring frames are correlated, so smoothing gains less than with white noise.
+How much of the stated variances is fast, and so smoothed away, the path itself shows: `smoothing.kalman`.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.motion.free_fall import GENERIC_NOISE
+from airborne.motion.smoothing.kalman import PathErrors, error_correlations, path_errors
 from airborne.motion.smoothing.segments import MIN_FRAMES, SmoothedPaths, finite_rows
 from airborne.types import Array
 
@@ -25,27 +24,34 @@ class Operator(Protocol):
     def __call__(self, known_s: Array, values: Array, at_s: Array) -> Array: ...  # noqa: D102
 
 
-def apply_operator(operator: Operator, time_s: Array, values: Array, covariance: Array) -> SmoothedPaths:
+def apply_operator(
+    operator: Operator, time_s: Array, values: Array, covariance: Array, *, are_errors_slow: bool
+) -> SmoothedPaths:
     """Apply an operator to the known rows of a stretch (n, k), with standard deviations from the variances."""
     is_known = finite_rows(values)
     smooth = operator(time_s[is_known], values[is_known], time_s)
     variance = np.diagonal(covariance, axis1=1, axis2=2)
+    errors = path_errors(time_s, values, covariance, are_slow=are_errors_slow)
     sd = np.empty_like(smooth)
     done: list[int] = []
     for k in range(values.shape[1]):
         same = next((j for j in done if np.array_equal(variance[:, j], variance[:, k], equal_nan=True)), None)
         sd[:, :, k] = (
-            _standard_deviations(operator, time_s, is_known, variance[:, k]) if same is None else sd[:, :, same]
+            sd[:, :, same]
+            if same is not None
+            else _standard_deviations(operator, time_s, is_known, variance[:, k], errors)
         )
         done.append(k)
     return SmoothedPaths(*smooth, *sd)
 
 
-def _standard_deviations(operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array) -> Array:
+def _standard_deviations(
+    operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array, errors: PathErrors | None
+) -> Array:
     """Return the sd (3, n) of one path; NaN where it depends on an unknown or infinite variance (n,)."""
     n = len(time_s)
     sd = np.full((3, n), np.nan)
-    if not np.isfinite(variance[is_known]).any():
+    if errors is None or not np.isfinite(variance[is_known]).any():
         return sd
     known_rows = np.flatnonzero(is_known)
     for start in range(0, n, _BLOCK):
@@ -54,28 +60,25 @@ def _standard_deviations(operator: Operator, time_s: Array, is_known: NDArray[np
         last = known_rows[np.searchsorted(known_rows, min(stop + _MARGIN, n) - 1)]
         rows = slice(int(first), int(last) + 1)
         inner = slice(start - rows.start, stop - rows.start)
-        sd[:, start:stop] = _block_sd(operator, time_s[rows], is_known[rows], variance[rows])[:, inner]
+        sd[:, start:stop] = _block_sd(operator, time_s[rows], is_known[rows], variance[rows], errors)[:, inner]
         if stop == n:
             break
     return sd
 
 
-def _block_sd(operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array) -> Array:
+def _block_sd(
+    operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array, errors: PathErrors
+) -> Array:
     known_s, variance = time_s[is_known], variance[is_known]
     if len(known_s) < MIN_FRAMES:
         return np.full((3, len(time_s)), np.nan)
     is_stated = np.isfinite(variance) & (variance >= 0)
     weight = operator(known_s, np.eye(len(known_s)), time_s)  # (3, n, known)
     scaled = weight * np.sqrt(np.where(is_stated, variance, 0.0))
-    white = GENERIC_NOISE.white_share * (scaled**2).sum(axis=-1)
-    correlated = (1 - GENERIC_NOISE.white_share) * ((scaled @ _correlation_root(known_s)) ** 2).sum(axis=-1)
+    fast, slow = error_correlations(known_s, errors.white_share)
+    of_fast = np.sum(scaled @ fast * scaled, axis=-1)
+    at_row = np.interp(time_s, known_s[is_stated], variance[is_stated])
+    of_slow = np.sum(weight @ slow * weight, axis=-1) * at_row  # its size does not jump from row to row
+    squares = errors.fast_share * of_fast + (1 - errors.fast_share) * of_slow
     is_unknown = (weight[..., ~is_stated] ** 2).sum(axis=-1) > _NEGLIGIBLE_WEIGHT * (weight**2).sum(axis=-1)
-    return np.where(is_unknown, np.nan, np.sqrt(white + correlated))
-
-
-def _correlation_root(time_s: Array) -> Array:
-    """Return L with L L' = exp(-|t - t'| / 0.1 s): the Cholesky factor of a first-order Gauss-Markov process."""
-    lag_s = time_s[:, None] - time_s
-    decay = np.exp(-np.diff(time_s) / GENERIC_NOISE.correlation_time_s)
-    innovation = np.concatenate([[1.0], np.sqrt(1 - decay**2)])
-    return np.where(lag_s >= 0, np.exp(-np.maximum(lag_s, 0.0) / GENERIC_NOISE.correlation_time_s), 0.0) * innovation
+    return np.where(is_unknown, np.nan, np.sqrt(np.maximum(squares, 0.0)))

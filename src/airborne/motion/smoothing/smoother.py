@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import partial
+from dataclasses import fields
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -25,75 +23,16 @@ from airborne.motion.smoothing import (
     SmoothedPaths,
     SmoothedRotations,
     SmoothedSegments,
-    Smoother,
-    butterworth_smoother,
     continuous_quaternions,
-    kalman_smoother,
     smooth_rotations,
     smooth_stretches,
-    spline_smoother,
 )
 from airborne.motion.smoothing.free_rotation import conserve_momentum
 from airborne.motion.smoothing.segments import finite_rows
+from airborne.motion.smoothing.settings import Smoothing
 from airborne.types import Array, Progress
 
-_LONGEST_FILL_S = 0.5  # of a gap that may be filled
 CENTRE_OF_MASS = "centre_of_mass"
-_DESCRIPTIONS = {
-    "butterworth": "zero-lag Butterworth low-pass, second order forward and back, -3 dB of both at {cutoff:g} Hz",
-    "spline": "cubic smoothing spline by generalised cross-validation, weighted by 1 / variance",
-    "kalman": "Kalman smoother with white-noise jerk, its density by maximum likelihood, and the run's covariances",
-}
-_FILLED_BY = {
-    "butterworth": "a cubic spline through the known frames",
-    "spline": "the spline",
-    "kalman": "the smoother's own model",
-}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Smoothing:
-    """A smoothing method and its settings. Gaps up to `fill_s` [s] are filled; none by default.
-
-    Raises ResultError for gaps too long to fill, and for a cut-off with another method.
-    """
-
-    method: Literal["butterworth", "spline", "kalman"]
-    cutoff_hz: float | None = None  # of the Butterworth filter; None if still to be chosen
-    resample_hz: float | None = None  # of the Butterworth filter, for uneven times
-    fill_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.fill_s <= _LONGEST_FILL_S:
-            raise ResultError(
-                f"gaps of {self.fill_s:g} s cannot be filled; give 0 to {_LONGEST_FILL_S:g} s: "
-                "the motion in between is unknown"
-            )
-        if self.method != "butterworth" and not (self.cutoff_hz is self.resample_hz is None):
-            raise ResultError(f"cut-off and resampling are a Butterworth filter's; leave them out of {self.method}")
-
-    def smoother(self) -> Smoother:
-        """Return the smoother of one stretch. Raises ResultError for a Butterworth filter without a cut-off."""
-        if self.method == "butterworth":
-            if self.cutoff_hz is None:
-                raise ResultError("a Butterworth filter needs a cut-off in Hz; give one, such as 6")
-            return partial(butterworth_smoother, cutoff_hz=self.cutoff_hz, resample_hz=self.resample_hz)
-        return spline_smoother if self.method == "spline" else kalman_smoother
-
-    def history(self, boundaries_s: Sequence[float] | Mapping[str, Sequence[float]]) -> list[str]:
-        """Describe what was done, one operation per line."""
-        text = _DESCRIPTIONS[self.method].format(cutoff=self.cutoff_hz)
-        if self.resample_hz is not None:
-            text += f", on a cubic spline through the values sampled at {self.resample_hz:g} Hz"
-        fill = (
-            f"gaps up to {self.fill_s:g} s filled by {_FILLED_BY[self.method]}"
-            if self.fill_s
-            else "gaps are not filled"
-        )
-        spans = boundaries_s if isinstance(boundaries_s, Mapping) else {"": boundaries_s}
-        cuts = [f"{name} {', '.join(f'{t:.4f} s' for t in times)}".strip() for name, times in spans.items() if times]
-        ends = f"segments end at {'; '.join(cuts)}" if cuts else "no take-off or landing splits the motion"
-        return [f"smoothing: {text}", fill, ends]
 
 
 def smooth_root(motion: Motion, model: BodyModel, smoothing: Smoothing, boundaries_s: Sequence[float]) -> xr.Dataset:
@@ -102,7 +41,8 @@ def smooth_root(motion: Motion, model: BodyModel, smoothing: Smoothing, boundari
     The position is smoothed with the position's covariance, the orientation with the mean variance of its rotation
     vector; the Kalman smoother conserves the angular momentum of free flights. Angular velocities are in world axes.
     """
-    smooth, of_position, fill_s = smoothing.smoother(), motion.covariance[:, :3, :3], smoothing.fill_s
+    smooth = smoothing.smoother(has_joints=bool(motion.joints))
+    of_position, fill_s = motion.covariance[:, :3, :3], smoothing.fill_s
     variance = _mean_variance(motion.covariance[:, 3:6, 3:6])
     _require_covariances(smoothing, motion.position, of_position)
     position = smooth_stretches(
@@ -153,7 +93,15 @@ def smooth_landmarks(
         covariance, names = np.concatenate([covariance, diagonal[:, None]], axis=1), [*names, CENTRE_OF_MASS]
         status = np.concatenate([status, motion.status[:, None]], axis=1)
     own = [boundaries_s] * len(names)
-    segments = _smooth_points(motion.time_s, points, covariance, smoothing, boundaries_s=own, progress=progress)
+    segments = _smooth_points(
+        motion.time_s,
+        points,
+        covariance,
+        smoothing,
+        boundaries_s=own,
+        has_joints=bool(motion.joints),
+        progress=progress,
+    )
     if lasting is not None:  # errors of the centre of mass that last all run are not smoothed away
         sd, known = segments.paths.value_sd[:, -1], finite_rows(lasting)
         usual = np.median(lasting[known], axis=0) if known.any() else np.nan
@@ -179,7 +127,7 @@ def smooth_joint_angles(
     for k in range(n_joints):
         block = slice(6 + 3 * k, 9 + 3 * k)
         rotation = smooth_rotations(
-            smoothing.smoother(),
+            smoothing.smoother(has_joints=True),
             motion.time_s,
             matrix_from_angles(motion.joint_angles[:, k]),
             _mean_variance(motion.covariance[:, block, block]),
@@ -214,7 +162,9 @@ def smooth_players(
     n, n_players, n_joints = motion.points.shape[:3]
     own = [boundaries_s[name] for name in motion.players for _ in motion.joints]
     points, covariance = motion.points.reshape(n, -1, 3), motion.covariance.reshape(n, -1, 3, 3)
-    segments = _smooth_points(motion.time_s, points, covariance, smoothing, boundaries_s=own, progress=progress)
+    segments = _smooth_points(
+        motion.time_s, points, covariance, smoothing, boundaries_s=own, has_joints=True, progress=progress
+    )
     shape = (n, n_players, n_joints)
     segments = SmoothedSegments(
         SmoothedPaths(*(getattr(segments.paths, field.name).reshape(*shape, 3) for field in fields(SmoothedPaths))),
@@ -237,11 +187,12 @@ def _smooth_points(
     smoothing: Smoothing,
     *,
     boundaries_s: Sequence[Sequence[float]],
+    has_joints: bool,
     progress: Progress | None,
 ) -> SmoothedSegments:
     """Smooth points (n, p, 3) one after another; the result has the same axes."""
     _require_covariances(smoothing, points, covariance)
-    smooth, parts = smoothing.smoother(), []
+    smooth, parts = smoothing.smoother(has_joints=has_joints), []
     for k, own in enumerate(boundaries_s):
         parts.append(
             smooth_stretches(smooth, time_s, points[:, k], covariance[:, k], boundaries_s=own, fill_s=smoothing.fill_s)

@@ -19,7 +19,7 @@ _MOST_TRIES = 6  # of that
 _AT_THE_END = 0.98  # share of the range of penalties
 
 
-def spline_smoother(time_s: Array, values: Array, covariance: Array) -> SmoothedPaths:
+def spline_smoother(time_s: Array, values: Array, covariance: Array, *, are_errors_slow: bool = False) -> SmoothedPaths:
     """Smooth one stretch (n, k) with a cubic spline for each path, weighted by 1 / variance; see `Smoother`.
 
     Paths with an unknown or infinite variance anywhere are not weighted. The penalty minimises the generalised
@@ -33,7 +33,8 @@ def spline_smoother(time_s: Array, values: Array, covariance: Array) -> Smoothed
     for k in range(values.shape[1]):
         one = slice(k, k + 1)
         operator = _fit_operator(time_s[is_known], values[is_known, k], _weights(variance[is_known, k]))
-        parts.append(apply_operator(operator, time_s, values[:, one], covariance[:, one, one]))
+        own = values[:, one], covariance[:, one, one]
+        parts.append(apply_operator(operator, time_s, *own, are_errors_slow=are_errors_slow))
     for part in parts:
         part.acceleration[[0, -1]] = part.acceleration_sd[[0, -1]] = np.nan
     return SmoothedPaths(*(np.hstack([getattr(part, name) for part in parts]) for name in SmoothedPaths.__slots__))
