@@ -3,8 +3,9 @@
 import pytest
 
 from airborne.errors import TrialError
-from airborne.trial.file import read_tables, read_trial
+from airborne.trial.file import read_trial
 from airborne.trial.remainder import parse_remainder
+from airborne.trial.session import read_tables
 
 SESSION = """
 camera = [{ name = "left", video = "videos/{athlete}_{trial}_left.mp4" }]
@@ -78,6 +79,12 @@ def test_a_session_that_cannot_be_read_is_one_line(tmp_path, session):
     path.write_text(f"session = {session}\n")
     with pytest.raises(TrialError, match=r"session: expected the path|cannot be read"):
         read_trial(path)
+
+
+def test_what_is_missing_in_both_files_is_said_of_both(tmp_path):
+    (tmp_path / "session.toml").write_text(SESSION.replace('file = "body.toml"', 'preset = "human18"'))
+    with pytest.raises(TrialError, match=r"throw_3.toml with session.toml: body: .*stature_m"):
+        read_trial(write(tmp_path, 'labels = { athlete = "anna" }'))
 
 
 def test_athletes_that_are_no_tables_are_refused(tmp_path):

@@ -14,7 +14,7 @@ from typing import Any
 from airborne.errors import AirborneError, TrialError
 from airborne.io.names import check_column, check_path, file_stem
 from airborne.io.text import read_csv, read_toml
-from airborne.trial.file import read_tables
+from airborne.trial.session import read_tables
 
 TABLE = "trials.csv"
 OWN_COLUMNS = ("trial", "status", "error", "folder")  # of the batch's table
@@ -121,7 +121,7 @@ def _describe(path: Path, labels: Mapping[str, str]) -> BatchTrial:
 def _own_labels(path: Path) -> dict[str, str]:
     """Return the labels in a trial's file; none where it cannot be read: its task will say why."""
     try:
-        labels: Any = read_tables(path)[0].get("labels", {})
+        labels: Any = read_tables(path).tables.get("labels", {})
     except AirborneError:
         return {}
     return {str(key): str(value) for key, value in labels.items()} if isinstance(labels, dict) else {}

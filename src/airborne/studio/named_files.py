@@ -14,7 +14,7 @@ from airborne.errors import AirborneError, TrialError
 from airborne.io.text import read_toml
 from airborne.studio.folder import path_inside
 from airborne.studio.writing import FOLDER
-from airborne.trial.file import read_tables
+from airborne.trial.session import TrialTables, read_tables
 
 _OF_POSE = ("joints_m", "points_px", "detections")
 PATHS = {  # the keys of each table that are paths
@@ -33,7 +33,7 @@ def read_inner_tables(folder: Path, path: Path) -> dict[str, Any]:
     path_inside(folder, path.name)
     with suppress(OSError, ValueError):  # what is wrong is said below
         _refuse_outer(folder, path, "session", read_toml(path).get("session"))
-    tables, base = _read_tables(folder, path)
+    tables, base, _ = _read_tables(folder, path)
     if base != path.parent:
         raise TrialError(f"{path.name}: its session is in another folder; put the trial beside it")
     for key, name in _iterate_paths(tables):
@@ -44,7 +44,7 @@ def read_inner_tables(folder: Path, path: Path) -> dict[str, Any]:
     return tables
 
 
-def _read_tables(folder: Path, path: Path) -> tuple[dict[str, Any], Path]:
+def _read_tables(folder: Path, path: Path) -> TrialTables:
     """Read a trial's tables; of a file that is no TOML, half written, say, the error says where older ones are."""
     try:
         return read_tables(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
@@ -15,7 +14,7 @@ from airborne.body import SAMPLED, BodyModel, human18, human18_from_measurements
 from airborne.body.files import read_body
 from airborne.errors import MOST_SAID, MistakesError, TrialError, list_mistakes
 from airborne.io.names import ColumnName, Name
-from airborne.io.text import list_keys, read_toml
+from airborne.io.text import list_keys
 from airborne.tracking.methods import Settings
 from airborne.trial.body import BodyTable
 from airborne.trial.calibration import CalibrationTable
@@ -23,7 +22,7 @@ from airborne.trial.cameras import CameraTable
 from airborne.trial.keys import KeyTable
 from airborne.trial.lights import LightsTable
 from airborne.trial.masks import MaskTable
-from airborne.trial.session import join_session, session_path
+from airborne.trial.session import read_tables
 from airborne.trial.settings import (
     BODY_METHODS,
     KEY_METHODS,
@@ -202,31 +201,10 @@ class Trial(SettingsTable):
 
 def parse_trial(path: Path, track: dict[str, Any] | None = None, given_as: str = "{} = {!r}") -> Trial:
     """Read a trial's tables, but look for none of the files that they name; raises TrialError."""
-    tables, folder = read_tables(path)
-    trial = _validate(tables, track or {}, path.name, given_as)
-    trial._folder = folder
+    read = read_tables(path)
+    trial = _validate(read.tables, track or {}, read.name, given_as)
+    trial._folder = read.folder
     return trial
-
-
-def read_tables(path: Path) -> tuple[dict[str, Any], Path]:
-    """Read a trial's tables, joined with those of the session that it names, and the folder of their paths.
-
-    Paths are relative to the session's file where there is one, else to the trial's. Raises TrialError.
-    """
-    tables = _read_toml(path)
-    if "session" not in tables:
-        return tables, path.parent
-    session = session_path(tables["session"], path)
-    return join_session(tables, _read_toml(session), path), session.parent
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return read_toml(path)
-    except OSError as error:
-        raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
-    except tomllib.TOMLDecodeError as error:
-        raise TrialError(f"{path.name}: not a TOML file: {error}; correct it, or give a trial's TOML file") from error
 
 
 def read_trial(

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from airborne.errors import MistakesError
-from airborne.trial.file import Trial, read_tables
+from airborne.trial.file import Trial
+from airborne.trial.session import read_tables
 
 _MOST_MISTAKES = 100  # after which nothing is left
 
@@ -18,7 +19,7 @@ def parse_remainder(path: Path) -> Trial | None:
 
     None where it cannot be read without them. Raises TrialError for a file without tables.
     """
-    tables, folder = deepcopy(read_tables(path))
+    tables, folder, _ = deepcopy(read_tables(path))
     for _ in range(_MOST_MISTAKES):
         try:
             trial = Trial(**tables)

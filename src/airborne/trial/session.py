@@ -1,21 +1,50 @@
-"""A session file: the tables that many trials share, filled in for one of them."""
+"""A trial's tables, and those of its session: what many trials share, filled in for one of them."""
 
 from __future__ import annotations
 
 import os
 import re
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from airborne.errors import TrialError
 from airborne.io.names import check_path
+from airborne.io.text import read_toml
 
 _LONGEST_WORD = 80  # characters of a label, which a session may repeat
 _PLACE = re.compile(r"\{([^{}]*)\}")  # in a text of a session: {athlete}
 
 
-def session_path(name: Any, path: Path) -> Path:
+class TrialTables(NamedTuple):
+    """A trial's tables, joined with those of the session that it names."""
+
+    tables: dict[str, Any]
+    folder: Path  # that paths are relative to: the session's where there is one
+    name: str  # of the files, for errors
+
+
+def read_tables(path: Path) -> TrialTables:
+    """Read a trial's tables; raises TrialError."""
+    tables = _read_toml(path)
+    if "session" not in tables:
+        return TrialTables(tables, path.parent, path.name)
+    session = _session_path(tables["session"], path)
+    joined = _join_session(tables, _read_toml(session), path)
+    return TrialTables(joined, session.parent, f"{path.name} with {session.name}")
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return read_toml(path)
+    except OSError as error:
+        raise TrialError(f"{path}: cannot be read ({error.strerror}); give the path of a trial's TOML file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise TrialError(f"{path.name}: not a TOML file: {error}; correct it, or give a trial's TOML file") from error
+
+
+def _session_path(name: Any, path: Path) -> Path:
     """Return the path of the session that the trial of a file `path` names, without the dots that it can do without.
 
     Raises TrialError where the name is none of a file.
@@ -28,7 +57,7 @@ def session_path(name: Any, path: Path) -> Path:
     return plain if plain.exists() and session.exists() and plain.samefile(session) else session
 
 
-def join_session(tables: dict[str, Any], session: dict[str, Any], path: Path) -> dict[str, Any]:
+def _join_session(tables: dict[str, Any], session: dict[str, Any], path: Path) -> dict[str, Any]:
     """Return the tables of a trial that names a session: each the trial's own, else its athlete's, else the session's.
 
     The trial's name is that of its file `path` where it gives none. In the session's texts `{trial}` is the trial's
