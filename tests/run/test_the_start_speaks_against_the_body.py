@@ -1,5 +1,8 @@
 """Landmarks of a start that say that the body is too small, or its sides exchanged: none of its frames is tracked."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from airborne.cameras import Rig
@@ -21,9 +24,13 @@ def checked():
     for index in indices:
         kept.add(scene.frames(index))
     run = Motion.collect(track(scene, indices))
-    return lambda **said: check_run(
-        run, CROSS, Rig(scene.cameras), kept, is_preset=False, first=FirstPose(run.pose(0), **said)
-    )
+
+    def check(n_doubtful=0, **said):
+        status = np.where(np.arange(len(run)) < len(run) - n_doubtful, run.status, Status.UNCERTAIN.value)
+        first = FirstPose(run.pose(0), **said)
+        return check_run(replace(run, status=status), CROSS, Rig(scene.cameras), kept, is_preset=False, first=first)
+
+    return check
 
 
 def test_a_good_start_leaves_the_frames_tracked(checked):
@@ -43,3 +50,10 @@ def test_of_exchanged_sides_no_frame_is_tracked(checked):
     found = checked(exchange=CROSSED)
     assert found.motion.count(Status.TRACKED) == 0
     assert any(CROSSED in each for each in found.doubts)
+
+
+@pytest.mark.parametrize(("n_doubtful", "is_believed"), [(1, True), (6, False)])
+def test_a_start_that_may_face_the_other_way_is_believed_until_tracking_doubts_frames(checked, n_doubtful, is_believed):
+    found = checked(n_doubtful, ambiguity="start.points_px: fit as well")
+    assert (found.motion.count(Status.TRACKED) > 0) is is_believed
+    assert any("left and right may be exchanged" in each for each in found.doubts) is not is_believed

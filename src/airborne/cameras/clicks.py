@@ -19,7 +19,7 @@ def read_clicks(path: Path, cameras: Sequence[str], fewest: int = 2) -> tuple[tu
     """Read a table `point,<camera>_u,<camera>_v,...`: the points' names and their pixels (points, cameras, 2) [px].
 
     NaN where a point is not seen: blank, NaN or no columns. Raises CalibrationError where fewer than `fewest` of the
-    cameras have columns, and for a table that does not say this.
+    cameras have columns, where a column is of a camera written otherwise, and for a table that does not say this.
     """
     expected = "expected point,<camera>_u,<camera>_v,..."
     names, columns, values = read_named_numbers(path, "point", expected)
@@ -27,6 +27,10 @@ def read_clicks(path: Path, cameras: Sequence[str], fewest: int = 2) -> tuple[tu
     if unknown:
         raise CalibrationError(f"{path.name}: column '{unknown[0]}' is not <camera>_u or <camera>_v; {expected}")
     with_columns = [name for name in cameras if f"{name}_u" in columns and f"{name}_v" in columns]
+    meant = {_letters(name): name for name in cameras if name not in with_columns}
+    for column in columns:
+        if (name := meant.get(_letters(column[:-2]))) is not None:
+            raise CalibrationError(f"{path.name}: column '{column}' is of no camera; write {name}{column[-2:]}")
     if len(with_columns) < fewest:
         raise CalibrationError(
             f"{path.name}: has columns _u and _v of {', '.join(with_columns) or 'none'} of the cameras "
@@ -42,6 +46,11 @@ def read_clicks(path: Path, cameras: Sequence[str], fewest: int = 2) -> tuple[tu
         )
     refuse_same_clicks(path.name, cameras, px)
     return names, px
+
+
+def _letters(name: str) -> str:
+    """Return a name without what people write in two ways: case, spaces, signs."""
+    return "".join(filter(str.isalnum, name.casefold()))
 
 
 def refuse_same_clicks(where: str, cameras: Sequence[str], px: Array) -> None:
@@ -70,8 +79,9 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
     """
     (_, header), *rows = read_csv(path, expected, CalibrationError) or [(0, [])]
     if key not in header or len(set(header)) < len(header) or not rows:
-        header_text = ",".join(header)[:80] or "nothing"
-        raise CalibrationError(f"{path.name}: found header {header_text} and {len(rows)} rows; {expected}, each once")
+        header_text = ",".join(header)[:80]
+        found = f"found header {header_text} and {len(rows)} rows" if header_text else "is empty"
+        raise CalibrationError(f"{path.name}: {found}; {expected}, each once")
     key_column = header.index(key)
     columns = tuple(header[:key_column] + header[key_column + 1 :])
     names: list[str] = []
@@ -81,8 +91,11 @@ def read_named_numbers(path: Path, key: str, expected: str) -> tuple[tuple[str, 
         if len(row) != len(header):
             commas = ", and decimals points" if len(row) > len(header) else ""
             raise CalibrationError(f"{shown} has {len(row)} values; it needs {len(header)}{commas}; {expected}")
-        if not row[key_column] or row[key_column] in names:
-            raise CalibrationError(f"{shown} needs a {key} of its own; {expected}")
+        if not row[key_column]:
+            raise CalibrationError(f"{shown} names no {key}; {expected}")
+        if row[key_column] in names:
+            earlier = rows[names.index(row[key_column])][0]
+            raise CalibrationError(f"{shown}: {row[key_column]} stands in row {earlier} already; name each {key} once")
         names.append(row[key_column])
         cells = row[:key_column] + row[key_column + 1 :]
         where = f"{path.name}, row {line} ({key} '{row[key_column]}')"

@@ -237,13 +237,13 @@ class BodyRun:
         findings = [*([measured.wrong_fall.to_dict()] if measured.wrong_fall else []), *checked.findings]
         warnings = find_wrong_colours(model, motion, self.kept)
         self.recording.events.extend([*checked.doubts, *far_keys(self.trial, model, motion, rig)])
-        is_explained = checked.is_start_wrong or measured.wrong_fall is not None
-        if is_hardly_tracked(head := headline(motion)) and not is_explained:
+        if is_hardly_tracked(head := headline(motion)) and not checked.is_start_wrong:
             seen = look_at_silhouettes(self.trial, self.recording) if self.found is None else self.found.silhouettes
             if (why := explain_by_silhouettes(seen)) is None:
                 args = self.trial.settings, model, self.start, self.recording, progress_of("trying other videos")
                 why = explain_untracked(*args)
-            warnings += [why.sentence] if why.sentence not in self.recording.events else []
+            is_new = why.sentence not in self.recording.events and (why.is_cause or measured.wrong_fall is None)
+            warnings += [why.sentence] if is_new else []
             findings = [] if why.is_mix_up else [each for each in findings if each["is_alarm"]]
         return motion, {
             "name": self.trial.name,

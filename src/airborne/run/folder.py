@@ -52,6 +52,23 @@ def open_results(folder: Path) -> Iterator[None]:
         yield
 
 
+def refuse_full_folder(folder: Path, table: str, *, resume: bool, overwrite: bool) -> None:
+    """Raise ResultError for a folder that holds something else, or a run that is neither resumed nor replaced."""
+    rows, record = folder / table, folder / RUN_RECORD
+    foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
+    if not record.exists() and not rows.exists() and foreign:
+        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
+    refuse_links(folder)
+    if resume or not (record.exists() or rows.exists()):
+        return
+    recorded = read_record(record) if record.exists() else None  # what is damaged is not removed
+    is_replaced = recorded is not None and (overwrite or is_first_frame_alone(recorded))
+    if rows.exists() and not is_replaced:
+        raise RunThereError(
+            f"{folder} already holds a run; resume it (--resume), overwrite it (--overwrite), or give another folder"
+        )
+
+
 def prepare_folder(
     folder: Path, identity: dict[str, Any], table: str, *, resume: bool = False, overwrite: bool = False
 ) -> bool:
@@ -65,18 +82,9 @@ def prepare_folder(
     inputs.
     """
     rows, record = folder / table, folder / RUN_RECORD
-    foreign = {path.name for path in folder.iterdir()} - {LOCK, f"{RUN_RECORD}.part", *_BEFORE_A_RUN}
-    if not record.exists() and not rows.exists() and foreign:
-        raise ResultError(f"{folder} is not empty and holds no run; give a new or empty folder")
-    refuse_links(folder)
-    if record.exists() and not resume:
-        recorded = read_record(record)  # what is damaged is not removed
-        if overwrite or is_first_frame_alone(recorded):
-            _remove_run(folder)
-    if rows.exists() and not resume:
-        raise RunThereError(
-            f"{folder} already holds a run; resume it (--resume), overwrite it (--overwrite), or give another folder"
-        )
+    refuse_full_folder(folder, table, resume=resume, overwrite=overwrite)
+    if record.exists() and not resume and (overwrite or is_first_frame_alone(read_record(record))):
+        _remove_run(folder)
     if not rows.exists():
         write_json(record, identity)
         return False

@@ -22,11 +22,11 @@ from airborne.export.summary import joint_warnings
 from airborne.io.figures import names_not_drawn
 from airborne.io.folder_lock import sole_writer
 from airborne.motion import Motion, PlayersMotion, read_motion, read_players
-from airborne.motion.run_folder import CALIBRATION, EXPORTS, MOTION, REPORT, SUMMARY, read_summary
+from airborne.motion.run_folder import CALIBRATION, EXPORTS, JOINTS, MOTION, REPORT, SUMMARY, read_summary
 from airborne.run.body import BodyRun
 from airborne.run.corrections import corrections_of, lost_keys
 from airborne.run.drawing import DrawingThread
-from airborne.run.folder import is_finished, list_tables, prepare_folder, read_choice
+from airborne.run.folder import is_finished, list_tables, prepare_folder, read_choice, refuse_full_folder
 from airborne.run.identity import run_identity
 from airborne.run.mix_ups import refuse_mix_ups, refuse_same_files, start_foregrounds
 from airborne.run.opening import Opened, dark_start_error, open_live, open_trial, past_the_end_error
@@ -98,6 +98,7 @@ def track_trial(
         raise ResultError("--take chooses between poses that were found; this trial's [start] says where the body is")
     started_s = time.monotonic()
     with sole_writer(folder), ExitStack() as stack:  # from the beginning: to find the start takes its time
+        refuse_full_folder(folder, JOINTS if trial.has_players else MOTION, resume=resume, overwrite=overwrite)
         drawn = None if not pictures else "stills" if first_frame else "videos"
         options = _Options(
             folder, started_s, resume, overwrite, live, first_frame, drawn, take, progress, stage_progress

@@ -42,6 +42,7 @@ class Explanation(NamedTuple):
 
     sentence: str
     is_mix_up: bool  # videos or fields are mixed up, and the self-check says nothing right of their cameras
+    is_cause: bool = True  # something that was tried lets them be tracked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +133,8 @@ def _explain(best: list[_Change], names: tuple[str, ...], how_many: str, *, has_
     return Explanation(
         f"the first frames are not tracked either {', nor '.join(tried)}: are [start], the body and the "
         "calibration right, and does nothing stand between the cameras and the body?",
-        False,
+        is_mix_up=False,
+        is_cause=False,
     )
 
 

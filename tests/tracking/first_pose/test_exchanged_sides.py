@@ -55,3 +55,14 @@ def test_right_sides_of_a_body_of_other_lengths_raise_no_alarm(posture):
     targets = dict(zip(NAMES, points(posture, seed=posture), strict=True))
     fit = fit_pose(MODEL, targets, weights=LANDMARK_WEIGHTS)
     assert find_exchange(MODEL, targets, LANDMARK_WEIGHTS, fit) is None
+
+
+@pytest.mark.parametrize(("has_feet", "tells"), [(False, False), (True, True)])
+def test_points_of_a_straight_body_tell_which_way_it_faces_by_its_feet_alone(has_feet, tells):
+    kept = [
+        i for i, name in enumerate(NAMES) if "_" in name and "hand" not in name and (has_feet or "foot" not in name)
+    ]
+    first = fit_to_points(MODEL, "start", [NAMES[i] for i in kept], points(STRAIGHT)[kept])
+    assert bool(first.ambiguity) is not tells
+    assert not first.exchange and not first.doubts
+    assert tells or (first.ambiguity in first.notes and "points of foot_left and foot_right" in first.ambiguity)

@@ -18,7 +18,7 @@ from airborne.cameras.skeletons import LANDMARK_RECIPES, SKELETONS
 from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.tracking.first_pose.body_size import WrongSize, find_wrong_size
-from airborne.tracking.first_pose.exchange import find_exchange
+from airborne.tracking.first_pose.exchange import find_ambiguity, find_exchange
 from airborne.types import Array
 
 _ROUNDING_RAD = 1e-9  # an angle beyond its limit by less is at it
@@ -45,6 +45,7 @@ class FirstPose:
     points: Mapping[str, Array] = field(default_factory=dict)  # landmark -> (3,) world [m], those that were given
     wrong_size: WrongSize | None = None  # of the body, by the points
     exchange: str = ""  # what says that left and right of the body, its legs or its arms are exchanged
+    ambiguity: str = ""  # what says that the points do not tell which way the body faces
 
     @property
     def plain_notes(self) -> tuple[str, ...]:
@@ -121,6 +122,8 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
     given = {name: point for name, point in targets.items() if np.isfinite(point).all()}
     found = find_exchange(model, given, LANDMARK_WEIGHTS, fit)
     exchange = f"{where}: {found.sentence}" if found else ""
+    either_way = "" if found else find_ambiguity(model, given, LANDMARK_WEIGHTS, fit)
+    ambiguity = f"{where}: {either_way}" if either_way else ""
     wrong_size = None if found else find_wrong_size(model, given, LANDMARK_WEIGHTS, fit)
     doubt = "; check the points and the body's size" if fit.rms_m > _DOUBTFUL_RMS_M else ""
     mistakes = [
@@ -133,10 +136,11 @@ def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Ar
         f"the largest is {worst} with {off_m[worst] * 1e3:.0f} mm{doubt}",
         f"{where}: no place of {missing}; there the first pose is as near to straight as it can be" if missing else "",
         exchange,
+        ambiguity,
     ]
-    doubts = [note for note, is_doubt in zip(notes, (doubt, "", exchange), strict=True) if is_doubt]
+    doubts = [note for note, is_doubt in zip(notes, (doubt, "", exchange, ""), strict=True) if is_doubt]
     said = tuple(note for note in notes if note)
-    return FirstPose(fit.pose, said, tuple(doubts), tuple(mistakes), given, wrong_size, exchange)
+    return FirstPose(fit.pose, said, tuple(doubts), tuple(mistakes), given, wrong_size, exchange, ambiguity)
 
 
 def check_landmark_names(model: BodyModel, where: str, names: Sequence[str]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +73,14 @@ class Diagnosis:
     findings: tuple[LikelyCause, ...]
     theta: Array  # (k,)
     covariance: Array  # (k, k)
+
+    def with_size_sd(self, sd: float) -> Diagnosis:
+        """Return it with a further sd of how large the body looks, as a share."""
+        findings = (
+            replace(each, sd=float(np.hypot(each.sd, sd))) if (each.subject, each.kind) == ("body", "scale") else each
+            for each in self.findings
+        )
+        return replace(self, findings=tuple(findings))
 
     @property
     def has_alarm(self) -> bool:
