@@ -183,7 +183,7 @@ def test_a_dry_run_names_a_body_that_cannot_be_used(season, tmp_path, capsys):
     body = tmp_path / "trials" / "good" / "cross.toml"
     body.write_text(re.sub(r"size_m = \[[^,]*", "size_m = [600.0", body.read_text(), count=1))
     assert in_process("batch", tmp_path / "trials", "-o", tmp_path / "out", "--dry-run") == 1
-    assert re.match(r"good: cannot be tracked: .*is it in millimetres", capsys.readouterr().out)
+    assert re.match(r"good: cannot be tracked: .*is it in mm or cm", capsys.readouterr().out)
 
 
 @pytest.mark.usefixtures("impatient")

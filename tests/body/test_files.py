@@ -131,6 +131,11 @@ def test_file_holds_segments_parts_positions_and_colours(tmp_path):
         ("colour_srgb = [10, 20, 30]", "", "part 'upper' needs colour_srgb"),
         ('colour = "sample"', 'colour = "sample"\ncolour_srgb = [1, 2, 3]', "part 'lower' needs colour_srgb"),
         ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20, 256]", "colour_srgb, value 3"),
+        (
+            "colour_srgb = [10, 20, 30]",
+            "colour_srgb = [0.8, 0.2, 0]",
+            "part 'upper': colour_srgb looks like shares of 1",
+        ),
         ("colour_srgb = [10, 20, 30]", "colour_srgb = [10, 20]", "part 'upper': colour_srgb"),
         ('colour = "sample"', 'colour = "guess"', "part 'lower': colour"),
         ('parent = "thigh"', 'parent = "hip"', "parent 'hip' must stand before it; so far: thigh"),
@@ -247,8 +252,8 @@ def test_a_mesh_with_a_few_bad_edges_is_taken_with_a_note_that_counts_and_places
 
 def test_measures_in_millimetres_are_noticed(tmp_path):
     trimesh.creation.box(extents=[100, 200, 300]).export(tmp_path / "lump.stl")
-    assert "is in millimetres" in complaint(tmp_path, MESH.replace("FILE", "lump.stl"))
-    with pytest.raises(BodyError, match="is it in millimetres"):
+    assert "0.001 if it is in millimetres" in complaint(tmp_path, MESH.replace("FILE", "lump.stl"))
+    with pytest.raises(BodyError, match="is it in mm or cm"):
         Box(np.array([60.0, 900.0, 45.0]))
 
 

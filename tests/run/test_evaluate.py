@@ -187,6 +187,12 @@ def test_a_folder_that_holds_another_run_is_left_alone(run, tmp_path):
     assert contents_of(other) == before
 
 
+def test_a_repeat_that_is_the_run_itself_is_said_to_tell_nothing(run, tmp_path):
+    again = shutil.copytree(run, tmp_path / "again")
+    said = evaluate_agreement(run, repeats=[again], out=tmp_path / "out").doubts
+    assert [f"{again} is {run} to the last digit" in each for each in said] == [True]
+
+
 def test_a_second_reference_leaves_the_results_of_the_first(run, tmp_path):
     truth = shutil.copyfile(run / "motion.csv", tmp_path / "truth.csv")
     for references in ({"joints": run.parent / "higher.csv"}, {"truth": truth}, {"truth": truth}):

@@ -167,6 +167,16 @@ def test_exports_of_the_run_before_are_named(path, tmp_path):
     assert "export/ is of the run before; `airborne export` writes it anew" in warnings
 
 
+def test_of_a_player_who_starts_in_the_air_no_frame_is_tracked(path, tmp_path):
+    text = path.read_text()
+    raised = re.sub(r"(ankle_\w+ = \[[^,]+, [^,]+, )0\.\d+", r"\g<1>0.4", text, count=2)
+    assert raised != text
+    path.with_name("raised.toml").write_text(raised)
+    summary = track_trial(read_trial(path.with_name("raised.toml")), tmp_path / "run", pictures=False).summary
+    assert [player["n_tracked"] for player in summary["players"].values()] == [0, 9]
+    assert any(each.startswith("player 'Anna': both ankles lie 0.40 m or more over") for each in summary["events"])
+
+
 def test_a_start_past_the_end_is_refused(tmp_path):
     trial = write_trial(tmp_path / "trial", 4, start="frame = 30")
     with pytest.raises(TrialError, match="there is no frame 30"):

@@ -146,9 +146,10 @@ def test_a_mix_up_with_a_camera_without_an_image_is_not_undone():
 
 def test_what_moves_explains_it_before_anything_is_tracked_anew():
     mix_up = explain_by_silhouettes(MovingSilhouettes(0.5, ("those without cam2 can",), "cam1 is mirrored"))
-    assert mix_up == ("cam1 is mirrored", True)
+    assert mix_up == ("cam1 is mirrored", True, True)
     assert explain_by_silhouettes(MovingSilhouettes(0.5, ("those without cam2 can",))) == (
         "those without cam2 can",
         False,
+        True,
     )
     assert explain_by_silhouettes(MovingSilhouettes(0.05)) is None

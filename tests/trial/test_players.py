@@ -162,6 +162,7 @@ def test_the_shared_clip_is_read_as_it_is(shared_data):
         ),
         ("hip_left = [-0.72, 0.0, 0.9]", "hip_left = [-0.72, 0.0, 0.05]", "a hip lies lower than an ankle"),
         ("ankle_left = [-0.72, 0.0, 0.1]", "ankle_left = [-0.72, 0.0, -0.35]", "0.35 m under the floor"),
+        ("torso = [-0.6, 0.0, 1.2]", "torso = [0.2, 0.0, 1.2]", "lies 0.85 m from the hips; is it another's?"),
         ("[start]", "[start]\nposition_m = [0, 0, 1]", "of several players [[start.player]] tables"),
     ],
 )

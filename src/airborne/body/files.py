@@ -161,6 +161,8 @@ def _part(table: _PartTable, path: Path) -> Part:
         table.centre_m, Rotation.from_euler("XYZ", table.rotation_deg, degrees=True)
     )
     colour = None if table.colour_srgb is None else np.array(table.colour_srgb)
+    if colour is not None and np.max(colour) <= 1 and np.any(colour % 1):
+        raise BodyError(f"{path.name}: part '{table.name}': colour_srgb looks like shares of 1; give 0 to 255")
     shape, slab = _shape(table, path), WHOLE if table.slab_m is None else (table.slab_m[0], table.slab_m[1])
     try:
         return Part(table.name, shape, segment_from_part, colour, slab)

@@ -54,10 +54,10 @@ def read_mesh(path: Path, scale: float) -> Mesh:
             f"{path.name}: the mesh is not closed, {len(bad)} of its {n_edges} edges do not have two faces; fill its "
             "holes, so that inside and outside can be told"
         )
-    if np.ptp(vertices, axis=0).max() > LONGEST_M:
-        raise BodyError(
-            f"{path.name}: the mesh is over {LONGEST_M:.0f} m long; give scale = 0.001 if it is in millimetres"
-        )
+    if (long_m := float(np.ptp(vertices, axis=0).max())) > LONGEST_M:
+        units = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}
+        ways = ", or ".join(f"{scale} if it is in {unit} ({scale * long_m:.2g} m)" for unit, scale in units.items())
+        raise BodyError(f"{path.name}: the mesh is {long_m:.3g} m long, over {LONGEST_M:.0f} m; give scale = {ways}")
     note = _bad_edges_note(path.name, vertices[bad].mean(axis=1), n_edges) if len(bad) else ""
     return Mesh(vertices, faces if volume >= 0 else faces[:, ::-1], note=note)
 

@@ -51,7 +51,6 @@ class Mesh:
 Shape = Ellipsoid | Box | Mesh
 
 LONGEST_M = 20.0  # no part of a body is longer
-_LONGEST_CM = 250.0  # chosen: a larger number is no person's or implement's part in centimetres
 _SHORTEST_M = 1e-9  # nor shorter: areas of sides would vanish in rounding
 WHOLE = (-np.inf, np.inf)  # a part that is not clipped to a slab
 
@@ -297,5 +296,4 @@ def _require_positive(values: Array, name: str) -> None:
     if values.shape != (3,) or not np.all(np.isfinite(values)) or np.any(values < _SHORTEST_M):
         raise BodyError(f"{name} is {np.asarray(values).tolist()}; it needs three lengths above zero, in metres")
     if np.any(values > LONGEST_M):
-        unit = "millimetres" if np.max(values) > _LONGEST_CM else "centimetres or millimetres"
-        raise BodyError(f"{name} is {np.asarray(values).tolist()}: over {LONGEST_M:.0f} m; is it in {unit}?")
+        raise BodyError(f"{name} is {np.asarray(values).tolist()}: over {LONGEST_M:.0f} m; is it in mm or cm?")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from airborne.calibration.from_points import Calibration, CameraFit
+from airborne.cameras import Camera
 
 
 def describe_points_calibration(calibration: Calibration) -> str:
@@ -34,7 +37,6 @@ def points_calibration_to_dict(calibration: Calibration) -> dict:
     """Return the same, and the cameras' numbers, as plain values for JSON; None where a value does not exist."""
     cameras = {}
     for camera, fit in zip(calibration.rig, calibration.fits, strict=True):
-        height_angle = 2 * math.atan(camera.size[1] / (2 * camera.K[1, 1]))
         cameras[fit.name] = {
             "model": fit.model,
             "n_points": fit.n_points,
@@ -47,7 +49,7 @@ def points_calibration_to_dict(calibration: Calibration) -> dict:
             "dlt_coefficients": fit.dlt.tolist(),
             "position_m": camera.centre.tolist(),
             "focal_px": float(camera.K[0, 0]),
-            "height_angle_deg": math.degrees(height_angle),
+            "height_angle_deg": _height_angle_deg(camera),
             "principal_point_px": camera.K[:2, 2].tolist(),
             "distortion": camera.distortion.tolist(),
             "sd": fit.sd,
@@ -65,3 +67,11 @@ def _row(fit: CameraFit) -> tuple[str, ...]:
     held_out_px = fit.held_out_rms_px[fit.model]
     numbers = (fit.rms_px, fit.rms_m * 1e3, held_out_px, fit.held_out_m * 1e3, fit.dlt_rms_px)
     return (fit.name, str(fit.n_points), *(f"{number:.2f}" for number in numbers), fit.model)
+
+
+def _height_angle_deg(camera: Camera) -> float:
+    """Return the angle that the image spans from top to bottom through its principal point, seen through the lens."""
+    u = camera.K[0, 2]
+    rows = camera.undistort_px(np.array([[u, -0.5], [u, camera.size[1] - 0.5]]))[:, 1]
+    top, bottom = np.arctan((rows - camera.K[1, 2]) / camera.K[1, 1])
+    return math.degrees(bottom - top)

@@ -42,15 +42,15 @@ def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Itera
         yield "found in no frame: nothing was measured"
         return
     if player["n_lost"]:
-        yield f"{count_of(player['n_lost'], n, 'frame')} lost; they hold no numbers"
+        holds = "it holds" if player["n_lost"] == 1 else "they hold"
+        yield f"{count_of(player['n_lost'], n, 'frame')} lost; {holds} no numbers"
     if doubts := player.get("doubts"):
         yield f"uncertain are {'; '.join(doubts)}; look at them before use"
     elif player["n_uncertain"]:
         yield f"{count_of(player['n_uncertain'], n, 'frame')} uncertain; look at them before use"
     if player["n_below_two_cameras"]:
-        yield (
-            f"{player['n_below_two_cameras']} of {n} frames rest on fewer than two cameras, so that depth is a guess"
-        )
+        few, rest = player["n_below_two_cameras"], "rests" if player["n_below_two_cameras"] == 1 else "rest"
+        yield f"{few} of {n} frames {rest} on fewer than two cameras, so that depth is a guess"
     n_posed = player["n_tracked"] + player["n_uncertain"]
     if not player["n_tracked"] and not summary.get("self_check"):  # which says why
         yield (

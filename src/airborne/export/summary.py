@@ -98,7 +98,8 @@ def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
     if not n_posed:
         yield "The body was found in no frame: this run measured nothing."
     elif head["n_lost"]:
-        yield f"{count_of(head['n_lost'], n, 'frame')} lost; they hold no numbers."
+        holds = "it holds" if head["n_lost"] == 1 else "they hold"
+        yield f"{count_of(head['n_lost'], n, 'frame')} lost; {holds} no numbers."
     if n > 1 and n_posed and not head["n_tracked"]:
         yield "No frame was tracked: none of these numbers can be relied on."
     elif is_mostly_untracked(head):

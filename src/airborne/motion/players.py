@@ -95,9 +95,10 @@ class PlayersMotion:
         """Standard deviations of the joints, the root mean square of their axes': (n, players, joints) [m]."""
         return np.asarray(standard_deviation(np.diagonal(self.covariance, axis1=-2, axis2=-1).mean(axis=-1)))
 
-    def without_tracked(self) -> PlayersMotion:
-        """Return the same with what is tracked called uncertain."""
-        is_tracked = self.joint_status == Status.TRACKED.value
+    def without_tracked(self, players: Sequence[str] | None = None) -> PlayersMotion:
+        """Return the same with what is tracked of these players, or of all, called uncertain."""
+        is_meant = np.array([players is None or name in players for name in self.players], bool)
+        is_tracked = (self.joint_status == Status.TRACKED.value) & is_meant[:, None]
         return replace(self, joint_status=np.where(is_tracked, Status.UNCERTAIN.value, self.joint_status))
 
     def count(self, player: str, status: Status) -> int:

@@ -14,7 +14,7 @@ from typing import Any
 
 from airborne.body.symmetry import symmetries
 from airborne.cameras import read_rig
-from airborne.errors import ResultError, count_of
+from airborne.errors import ResultError
 from airborne.evaluation import (
     Agreement,
     DigitisedComparison,
@@ -42,12 +42,12 @@ from airborne.evaluation.agreement_text import agreement_table, methods_text, re
 from airborne.evaluation.variables import headline_series
 from airborne.export import write_json
 from airborne.export.report import write_report
-from airborne.export.summary import is_mostly_untracked
 from airborne.export.viewer import body_viewer
 from airborne.io.text import read_text
 from airborne.io.writing import write_text
 from airborne.motion import run_folder
 from airborne.motion.run_folder import check_record, holds_players, read_body_run, read_record
+from airborne.run.doubtful_runs import doubt_runs
 from airborne.run.folder import open_results
 from airborne.run.provenance import versions
 from airborne.run.reference_series import body_series, players_series
@@ -247,17 +247,7 @@ def evaluate_agreement(
         )
         write_text(out / run_folder.AGREEMENT_METHODS, text)
     wrote = (*files, run_folder.AGREEMENT_METHODS)
-    doubts = tuple(doubt for each in (folder, *repeats) if (doubt := _doubt_run(each)))
-    return AgreementReport(agreements, repeatable, first, tuple(left_out), out, wrote, doubts)
-
-
-def _doubt_run(folder: Path) -> str:
-    """Say that less than half of the run in a folder is tracked, if that is so."""
-    summary = run_folder.read_summary(folder) if (folder / run_folder.SUMMARY).is_file() else None
-    if summary is None or not is_mostly_untracked(summary):
-        return ""
-    tracked = count_of(summary["n_tracked"], summary["n_frames"], "frame")
-    return f"{folder}: {tracked} tracked: how well it agrees says nothing"
+    return AgreementReport(agreements, repeatable, first, tuple(left_out), out, wrote, doubt_runs(folder, repeats))
 
 
 def _read_earlier(path: Path) -> str:

@@ -23,7 +23,13 @@ from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, vid
 from airborne.motion.untracked_players import has_untracked_player, without_untracked
 from airborne.run.opening import Opened
 from airborne.run.players_cameras import CameraCheck
-from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
+from airborne.run.players_tracker import (
+    MOST_ABOVE_FLOOR_M,
+    height_m,
+    player_starts,
+    players_tracker_of,
+    start_notes,
+)
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.status import UNCERTAIN_SD_M as BLOCKER_SD_M
@@ -138,12 +144,14 @@ class PlayersRun:
         self, folder: Path, drawn: OverlaysAs | None, progress_of: Callable[[str], Progress | None]
     ) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
-        tracked = read_players(folder / self.table)
+        written = read_players(folder / self.table)
+        floating = [start.name for start in self.starts if start.has_legs and height_m(start) > MOST_ABOVE_FLOOR_M]
+        tracked = written.without_tracked(floating)
         motion = without_untracked(tracked)
         wrong = find_wrong_gravity(motion)
         if wrong is not None:
             motion = motion.without_tracked()
-        if not np.array_equal(motion.joint_status, tracked.joint_status):
+        if not np.array_equal(motion.joint_status, written.joint_status):
             write_players(folder / self.table, motion)
         write_players_parquet(tables_of(folder) / "joints.parquet", folder / self.table)
         jumps = measure_jumps(motion)

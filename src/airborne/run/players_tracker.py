@@ -27,6 +27,7 @@ from airborne.video import Frames, View
 
 _CLEARLY = 0.5  # cosine of lines from right to left; chosen so that a pelvis may turn 60 degrees over the legs
 _LEAST_APART_M = 0.15  # chosen: the middles of two trunks, each 0.2 m deep or more, are farther from each other
+MOST_ABOVE_FLOOR_M = 0.25  # of the lower ankle; chosen: twice as high as where people stand, calibrations a few cm off
 _AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 _LARGEST_TABLE_BYTES = 50_000_000  # larger files are refused
@@ -80,12 +81,22 @@ def _check_apart(trial: Trial, starts: Sequence[PlayerStart]) -> None:
             )
 
 
+def height_m(start: PlayerStart) -> float:
+    """Return how high the lower ankle of a player with legs is at the start."""
+    return float(min(start.joints_m["ankle_left"][2], start.joints_m["ankle_right"][2]))
+
+
 def start_notes(starts: Sequence[PlayerStart]) -> list[str]:
     """Say of each player of whose hips, knees and ankles one pair points against both others that it may be crossed."""
     notes = []
     for start in starts:
         if not start.has_legs:
             continue
+        if (over_m := height_m(start)) > MOST_ABOVE_FLOOR_M:
+            notes.append(
+                f"player '{start.name}': both ankles lie {over_m:.2f} m or more over the floor, z = 0, so no frame "
+                "counts as tracked: start where the player stands, or correct the joints or the floor"
+            )
         pairs = {
             f"{part}s": start.joints_m[f"{part}_left"] - start.joints_m[f"{part}_right"]
             for part in ("hip", "knee", "ankle")

@@ -20,6 +20,7 @@ _MOST_UNDER_FLOOR_M = 0.3  # by how much a calibration's floor may be off
 _MOST_LEANING = 2.0
 # chosen: three sds of the mean of both knees or feet, of joints that are 20 mm off each way
 _MOST_BEHIND_M = 0.05
+_MOST_TO_TORSO_M = 0.5  # chosen: twice as far as the midpoint of hips and shoulders lies from the hips
 
 
 class PlayerTable(SettingsTable):
@@ -91,6 +92,11 @@ def _check_legs(start: PlayerStart) -> None:
     if points[:2, 2].min() < points[4:, 2].max():
         raise ValueError("a hip lies lower than an ankle; were they exchanged?")
     _check_facing(start)
+    to_torso_m = float(np.linalg.norm(start.joints_m["torso"] - points[:2].mean(axis=0)))
+    if to_torso_m > _MOST_TO_TORSO_M:
+        raise ValueError(
+            f"the torso, midway between hips and shoulders, lies {to_torso_m:.2f} m from the hips; is it another's?"
+        )
     under_m = -float(points[:, 2].min())
     if under_m > _MOST_UNDER_FLOOR_M:
         raise ValueError(f"a joint lies {under_m:.2f} m under the floor, which must be z = 0")

@@ -26,7 +26,7 @@ def test_a_world_of_a_wrong_size_is_named_with_its_size_and_the_frame_rate_that_
     right, wrong = measure_gravity(CLEAN), find_wrong_gravity(replace(CLEAN, points=scale * CLEAN.points))
     assert wrong.value_m_s2 == pytest.approx(scale * right.value_m_s2)
     ratio = wrong.value_m_s2 / G
-    percent, way, rate = re.search(r"is (\d+)% too (\w+), or .* is ([\d.]+) of that", wrong.sentence).groups()
+    percent, way, rate = re.search(r"is (\d+)% too (\w+), or .* is ([\d.]+) times that", wrong.sentence).groups()
     assert float(percent) == pytest.approx(100 * abs(ratio - 1), abs=1)
     assert (way, float(rate)) == ("large" if scale > 1 else "small", pytest.approx(ratio**0.5, abs=0.01))
     assert wrong.to_dict()["value"] == pytest.approx(wrong.value_m_s2 - G)

@@ -23,5 +23,5 @@ def test_a_jump_filmed_at_more_images_than_stated_is_said_to_fall_slowly(share):
     said = describe_slow_falls(slow)
     assert (len(measure_jumps(slow)), len(said)) == ((1, 0) if share == 1 else (0, 1))
     if said:
-        found = re.search(r"falls at (.*) m/s², not at 9\.81.* is (.*) of that at which", said[0])
+        found = re.search(r"falls at (.*) m/s², not at 9\.81.* is (.*) times that at which", said[0])
         assert [float(each) for each in found.groups()] == pytest.approx([G * share**2, share], rel=0.1)

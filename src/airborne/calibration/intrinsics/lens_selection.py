@@ -130,7 +130,8 @@ def _cross_validate(fit: Adjustment, fold: NDArray[np.integer]) -> Array:
         held_out = source.select(is_held_out)
         squares = np.sum(_adjust(fitted.rig, [held_out], ALL_FIXED).residual_px[0] ** 2, axis=1)
         for m in np.flatnonzero(fold == k):
-            score[m] = np.sqrt(np.nanmean(squares[held_out.moments == m]))
+            known = squares[held_out.moments == m]
+            score[m] = np.sqrt(np.mean(known[np.isfinite(known)])) if np.isfinite(known).any() else np.nan
     return score
 
 

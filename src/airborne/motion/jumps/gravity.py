@@ -38,7 +38,7 @@ class Gravity(NamedTuple):
         return (
             f"in flight the players fall at {self.value_m_s2:.1f} ± {self.sd_m_s2:.1f} m/s² instead of "
             f"{GRAVITY_M_S2:.2f}: the world is {abs(ratio - 1):.0%} too {'large' if ratio > 1 else 'small'}, or the "
-            f"stated frame rate is {np.sqrt(ratio):.2f} of that at which it was filmed; no joint is called tracked. "
+            f"stated frame rate is {np.sqrt(ratio):.2f} times that at which it was filmed; no joint is called tracked. "
             "Check the lengths of the calibration and the frame rate"
         )
 

@@ -62,7 +62,7 @@ def describe_slow_falls(motion: PlayersMotion) -> list[str]:
             said.append(
                 f"{player}: from frame {track.index[first]} both feet are up for {up_s:.2f} s while the body falls "
                 f"at {fall_m_s2:.1f} m/s², not at {GRAVITY_M_S2:.2f}: this is no jump, or the stated frame rate is "
-                f"{np.sqrt(fall_m_s2 / GRAVITY_M_S2):.2f} of that at which it was filmed"
+                f"{np.sqrt(fall_m_s2 / GRAVITY_M_S2):.2f} times that at which it was filmed"
             )
     return said
 

@@ -92,7 +92,7 @@ def find_wrong_flight(time_s: Array, position: Array, R: Array, covariance: Arra
         falls,
         found.sd_m_s2,
         f"the body falls at {falls:.1f} m/s² instead of {GRAVITY_M_S2:.2f}: the stated frame rate seems to be "
-        f"{np.sqrt(falls / GRAVITY_M_S2):.2f} of that at which it was filmed",
+        f"{np.sqrt(falls / GRAVITY_M_S2):.2f} times that at which it was filmed",
     )
 
 

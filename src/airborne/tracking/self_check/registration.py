@@ -266,4 +266,7 @@ def blur(plane: Array32, sigma: float) -> Array32:
 
 
 def _correlation(a: Array32, b: Array32) -> float:
+    """Return the correlation of two planes; NaN where one is the same everywhere."""
+    if not (np.ptp(a) and np.ptp(b)):
+        return np.nan
     return float(np.corrcoef(a.ravel(), b.ravel())[0, 1])
