@@ -7,7 +7,7 @@ import pytest
 
 from airborne.cameras import Rig
 from airborne.motion import Motion
-from airborne.run.self_check import check_run
+from airborne.run.self_check import check_run, looks_unlike
 from airborne.tracking import Status
 from airborne.tracking.first_pose import FirstPose
 from airborne.tracking.first_pose.body_size import WrongSize
@@ -57,3 +57,10 @@ def test_a_start_that_may_face_the_other_way_is_believed_until_tracking_doubts_f
     found = checked(n_doubtful, ambiguity="start.points_px: fit as well")
     assert (found.motion.count(Status.TRACKED) > 0) is is_believed
     assert any("left and right may be exchanged" in each for each in found.doubts) is not is_believed
+
+
+def test_first_frames_that_look_unlike_the_later_ones_are_told_and_single_later_ones_are_not():
+    scores = np.array([5.0, 12.0, 11.0, 5.0, 5.1, 12.0, 4.9, 5.2])
+    assert np.flatnonzero(looks_unlike(scores, first=1)).tolist() == [1, 2]
+    assert not looks_unlike(scores, first=3).any()
+    assert not looks_unlike(np.full(3, np.nan), first=0).any()
