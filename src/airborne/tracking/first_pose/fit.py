@@ -18,6 +18,7 @@ from airborne.cameras.skeletons import LANDMARK_RECIPES, SKELETONS
 from airborne.errors import BodyError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.tracking.first_pose.body_size import WrongSize, find_wrong_size
+from airborne.tracking.first_pose.click_mix_up import explain_misses
 from airborne.tracking.first_pose.exchange import find_ambiguity, find_exchange
 from airborne.types import Array
 
@@ -103,8 +104,13 @@ def fit_to_pixels(
         for camera, out, distance_px in zip(rig.names, is_left_out.T, agreed.distance_px.T, strict=True)
         if out.any()
     ]
-    first = fit_to_points(model, where, names, agreed.points)
-    return replace(first, notes=(*left_out, *first.notes))
+    why = explain_misses(rig, px[needed], weights[needed])
+    said = (f"{where}: {why}",) if why else ()
+    try:
+        first = fit_to_points(model, where, names, agreed.points)
+    except TrialError as error:
+        raise TrialError(said[0] if said else str(error)) from error
+    return replace(first, notes=(*said, *left_out, *first.notes), doubts=(*said, *first.doubts))
 
 
 def fit_to_points(model: BodyModel, where: str, names: Sequence[str], points: Array) -> FirstPose:
