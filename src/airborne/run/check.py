@@ -26,7 +26,7 @@ from airborne.run.opening import (
     video_source,
 )
 from airborne.run.players_mix_ups import refuse_players_mix_ups
-from airborne.run.players_tracker import player_starts, players_tracker_of, start_notes
+from airborne.run.players_tracker import doubt_starts, player_starts, players_tracker_of, start_notes
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
@@ -189,6 +189,8 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             recording.events.extend(start_notes(starts))
             if len(recording.rig) > 1:
                 checks.attempt(lambda: refuse_players_mix_ups(starts, recording), lambda _: _NO_MIX_UP)
+            with closing(iter(recording)) as frames:
+                checks.doubts += doubt_starts(starts, next(frames, None)).values()
     else:
         model = trial.model()
         found = checks.attempt(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from airborne.run.opening import Opened
 from airborne.run.players_cameras import CameraCheck
 from airborne.run.players_tracker import (
     MOST_ABOVE_FLOOR_M,
+    doubt_starts,
     height_m,
     player_starts,
     players_tracker_of,
@@ -65,6 +66,7 @@ class PlayersRun:
     players: PlayersTracker
     starts: tuple[PlayerStart, ...]
     cameras: CameraCheck = field(default_factory=CameraCheck)  # grows while the run is tracked
+    doubtful: frozenset[str] = frozenset()  # players whose starts the first images contradict
 
     table = JOINTS
 
@@ -94,8 +96,12 @@ class PlayersRun:
         """Write nothing: players have no body file."""
 
     def see(self, first: Frames) -> PlayersRun:
-        """Return the players as they are; their trackers learn from the first frames themselves."""
-        return self
+        """Return the players with doubts of their starts; their trackers learn from the first frames themselves."""
+        if not isinstance(self.recording, Recording):  # live, where frames do not wait
+            return self
+        doubts = doubt_starts(self.starts, first)
+        self.recording.events.extend(doubts.values())
+        return replace(self, doubtful=frozenset(doubts))
 
     def track(
         self,
@@ -146,7 +152,7 @@ class PlayersRun:
         """Write the tables; return the motion and the beginning of the summary."""
         written = read_players(folder / self.table)
         floating = [start.name for start in self.starts if start.has_legs and height_m(start) > MOST_ABOVE_FLOOR_M]
-        tracked = written.without_tracked(floating)
+        tracked = written.without_tracked([*floating, *self.doubtful])
         motion = without_untracked(tracked)
         wrong = find_wrong_gravity(motion)
         if wrong is not None:
@@ -158,7 +164,7 @@ class PlayersRun:
         self.recording.events.extend(describe_slow_falls(motion))
         write_jumps(folder / JUMPS, jumps)
         said = [] if wrong or self._is_slow else motion.players  # of a wrong world or rate, which makes all uncertain
-        doubts = {name: self._doubts(tracked, name) for name in said}
+        doubts = {name: self._doubts(written, name) for name in said}
         summary = {
             **self._summary(tracked if wrong is None else motion, doubts),
             "jumps": [jump_row(jump) for jump in jumps],

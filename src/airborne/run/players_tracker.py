@@ -16,6 +16,7 @@ from airborne.errors import TrialError
 from airborne.io.text import read_text
 from airborne.run.landmarks import read_joint_positions, triangulate_clicks
 from airborne.tracking.capsules import Blocker
+from airborne.tracking.capsules.start_check import MOST_MISS_M, start_misses_m
 from airborne.tracking.particle import GivenTorsos, legs_tracker
 from airborne.tracking.players import PlayerStart, PlayersTracker
 from airborne.trial.file import Trial
@@ -114,6 +115,19 @@ def start_notes(starts: Sequence[PlayerStart]) -> list[str]:
                     "and right exchanged there?"
                 )
     return notes
+
+
+def doubt_starts(starts: Sequence[PlayerStart], first: Frames | None) -> dict[str, str]:
+    """Say of whom the images of the first frame show the legs elsewhere than the start, by the players' names."""
+    with_legs = [start for start in starts if start.has_legs]
+    misses_m = [] if first is None else start_misses_m(with_legs, first)
+    return {
+        start.name: f"player '{start.name}': the images of the first frame show hips, knees and ankles "
+        f"{100 * miss_m:.0f} cm from where [[start.player]] has them, so no frame counts as tracked: are they of this "
+        "frame and player, and at the right height?"
+        for start, miss_m in zip(with_legs, misses_m, strict=False)
+        if miss_m > MOST_MISS_M
+    }
 
 
 def _cosine(a: Array, b: Array) -> float:

@@ -92,17 +92,20 @@ def fit_first_frame(
     others: Capsules,
     *,
     looser: float = 1.0,
+    freer: float = 1.0,
     start: Array | None = None,
 ) -> FirstFrameFit:
     """Fit pose and shape to the first frame, with the colours relearned in each round.
 
-    Joints that were not set by hand are `looser` by a factor. `start` (35,) is their `start_state`, where it is known.
+    Joints that were not set by hand are `looser` by a factor, and lengths of legs `freer`. `start` (35,) is their
+    `start_state`, where it is known.
 
     Raises TrialError where no camera shows the player.
     """
     state = start_state(name, joints_m) if start is None else start
     anchors = np.array([joints_m.get(joint, np.full(3, np.nan)) for joint in JOINTS], float)
     sd = np.concatenate([_POSE_SD, _LENGTH_SD, _RADIUS_SD * state[N_DOF + N_LENGTHS :]])
+    sd[[N_DOF + THIGH, N_DOF + SHANK]] *= freer
     prior = JumperPrior(state.copy(), np.diag(1 / sd**2), anchors, looser * _ANCHOR_SD_M)
     borders = [N_DOF + SHORTS_END, N_DOF + SOCK_END]
     for number in range(_ROUNDS):
