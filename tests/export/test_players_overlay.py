@@ -13,7 +13,7 @@ from airborne.cameras import Rig
 from airborne.export.broadcast import ACCENT, UNSURE, Height, Heights, Jumper, draw_heights
 from airborne.export.lettering import draw_text, text_width
 from airborne.export.palette import STATUS_RGB
-from airborne.export.players_overlay import GREEN_RGB, PlayersOverlayVideos, rectangle_px
+from airborne.export.players_overlay import GREEN_RGB, PlayersOverlayVideos, place_name, rectangle_px
 from airborne.tracking import Status
 from airborne.tracking.players import PlayerStart
 from airborne.video import Frames, View
@@ -180,3 +180,13 @@ def test_letters_stand_on_their_line_with_their_width_and_holes():
     n_holes = cv2.connectedComponents((picture[..., 0] < 128).astype(np.uint8))[0] - 2
     assert n_holes == 3
     assert text_width("", size_px=40) == 0
+
+
+def test_names_that_would_overlap_stand_above_each_other():
+    first = place_name(10, 50, 60, 12, [])
+    second = place_name(40, 48, 60, 12, [first])
+    third = place_name(30, 52, 60, 12, [first, second])
+    assert first == (10, 38, 70, 50)
+    assert second == (40, 26, 100, 38)
+    assert third == (30, 14, 90, 26)
+    assert place_name(200, 50, 60, 12, [first, second, third]) == (200, 38, 260, 50)

@@ -109,8 +109,8 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
         "<h2>Centre of mass and angular momentum</h2>",
         "<dt>Joint angles</dt>",
         "a free fall [mm]",
-        "mean over the frames, standard deviation of its error",
-        "its standard deviation over the frames about x",
+        "mean over the frames, standard deviation of a frame",
+        "scatter of the frames about x",
     )
     assert [word for word in words if word not in html] == []
     assert html.count("<img") == 5

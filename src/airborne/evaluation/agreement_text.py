@@ -84,13 +84,15 @@ def methods_text(
     results |= _paragraphs(_AGAINST, agreements, _agreement_sentence, questions)
     results |= _paragraphs(_BETWEEN, repeatabilities, _repeat_sentence)
     software = ", ".join(f"{name} {version}" for name, version in versions.items())
+    has_angles = any(" deg" in each for each in results.values())
+    of_angles = (
+        "Angles are in degrees; their differences were taken on the circle, within half a turn either way, and "
+        "somersault and twist left out within 5 degrees of 90 degrees of tilt. "
+    )
     text = [
-        "Agreement was computed with Airborne ("
-        + software
-        + "). Coordinates are in a world frame with z up, angles in "
-        "degrees; differences of angles were taken on the circle, to the nearest half turn, and somersault and twist "
-        "left out within 5 degrees of 90 degrees of tilt. Frames were matched in time to within a tenth of a period; "
-        "frames without a measurement were left out."
+        f"Agreement was computed with Airborne ({software}). Coordinates are in a world frame with z up. "
+        + of_angles * has_angles
+        + "Frames were matched in time to within a tenth of a period; frames without a measurement were left out."
     ]
     if any(head.startswith(_AGAINST) for head in results):
         text.append(

@@ -14,7 +14,7 @@ import numpy as np
 from airborne.body.legs import LEG_POINTS, RODS, SHANK_WIDTH_M, THIGH_WIDTH_M
 from airborne.cameras import Camera, Rig
 from airborne.export.broadcast import Heights, Jumper, draw_heights
-from airborne.export.lettering import draw_text
+from airborne.export.lettering import draw_text, text_width
 from airborne.export.overlays import CameraVideos, OverlaysAs, draw_label, line_px, time_label, view_image
 from airborne.export.palette import STATUS_RGB
 from airborne.tracking import Status
@@ -24,6 +24,7 @@ from airborne.types import Array, Image
 from airborne.video import Frames
 
 OverlayStyle = Literal["paper", "broadcast"]
+_Box = tuple[float, float, float, float]  # left, top, right, bottom [px]
 
 _ROD_WIDTHS_M = (THIGH_WIDTH_M, THIGH_WIDTH_M, SHANK_WIDTH_M, SHANK_WIDTH_M)  # as RODS
 GREEN_RGB = (0, 255, 0)  # the paper's
@@ -69,9 +70,10 @@ class PlayersOverlayVideos:
             if self._style == "broadcast":
                 draw_heights(image, camera, jumpers if view is not None else [])
             else:
+                names: list[_Box] = []
                 for each in found if view is not None else ():
                     own = [each.joint_status[k] for k in at]
-                    _draw_rods(image, camera, each.player, points=each.points[at], statuses=own)
+                    _draw_rods(image, camera, each.player, points=each.points[at], statuses=own, names=names)
                 draw_label(image, time_label(frames, status), camera.name, STATUS_RGB[status])
             images.append(image)
         self._videos.write(frames.index, images)
@@ -102,8 +104,13 @@ def rectangle_px(camera: Camera, upper: Array, lower: Array, width_m: float) -> 
     return np.stack([ends[0] - half, ends[0] + half, ends[1] + half, ends[1] - half])
 
 
-def _draw_rods(image: Image, camera: Camera, player: str, *, points: Array, statuses: Sequence[Status]) -> None:
-    """Draw a player's legs, LEG_POINTS (6, 3) [m], each rod in the colour of the less trusted of its ends."""
+def _draw_rods(
+    image: Image, camera: Camera, player: str, *, points: Array, statuses: Sequence[Status], names: list[_Box]
+) -> None:
+    """Draw a player's legs, LEG_POINTS (6, 3) [m], each rod in the colour of the less trusted of its ends.
+
+    The name stands above them, and above the names that are there; it joins these.
+    """
     drawn = []
     for (a, b), width_m in zip(RODS, _ROD_WIDTHS_M, strict=True):
         corners = rectangle_px(camera, points[a], points[b], width_m)
@@ -116,7 +123,18 @@ def _draw_rods(image: Image, camera: Camera, player: str, *, points: Array, stat
         highest = np.concatenate(drawn)
         x, y = highest[np.argmin(highest[:, 1])]
         size_px = image.shape[0] * _NAME_SHARE
-        draw_text(image, player, (x, y - size_px / 2), size_px=size_px, rgb=_rgb(worst_status(statuses)))
+        box = place_name(x, y - size_px / 2, text_width(player, size_px=size_px), size_px, names)
+        names.append(box)
+        draw_text(image, player, (box[0], box[3]), size_px=size_px, rgb=_rgb(worst_status(statuses)))
+
+
+def place_name(left: float, bottom: float, width: float, height: float, taken: Sequence[_Box]) -> _Box:
+    """Return a name's box (left, top, right, bottom) [px], moved up until it is clear of those taken."""
+    box = left, bottom - height, left + width, bottom
+    for other in sorted(taken, key=lambda each: -each[3]):
+        if box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]:
+            box = left, other[1] - height, left + width, other[1]
+    return box
 
 
 def _rgb(status: Status) -> tuple[int, int, int]:

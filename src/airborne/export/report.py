@@ -270,7 +270,7 @@ def _flight_comparison(comparison: Mapping[str, Any]) -> _Comparison:
 
 def _self_check_table(findings: Sequence[Mapping[str, Any]]) -> HtmlTable | None:
     """Return the sentences of the self-check; those that are alarms in words too."""
-    rows = [(each["sentence"], "wrong" if each["is_alarm"] else "as usual") for each in findings]
+    rows = [(each["sentence"], "wrong" if each["is_alarm"] else "nothing unusual") for each in findings]
     return HtmlTable(rows) if rows else None
 
 
@@ -278,11 +278,14 @@ def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:
     names = ("angular_momentum_kg_m2_s", "angular_momentum_sd_kg_m2_s", "angular_momentum_spread_kg_m2_s")
     mean, sd, scatter = (flight[name] for name in names)
     rows = [
-        (f"angular momentum about {axis} [kg m²/s]: mean over the frames, standard deviation of its error", *pair)
+        (
+            f"angular momentum about {axis} [kg m²/s]: mean over the frames, standard deviation of a frame",
+            *pair,
+        )
         for axis, *pair in zip("xyz", mean, sd, strict=True)
     ]
     rows += [
-        (f"its standard deviation over the frames about {axis} [kg m²/s]", each, "")
+        (f"scatter of the frames about {axis} [kg m²/s]: standard deviation", each, "")
         for axis, each in zip("xyz", scatter, strict=True)
     ]
     if flight["fitted_gravity_m_s2"] is None:

@@ -154,7 +154,7 @@ def joint_warnings(statuses: Mapping[str, Mapping[str, int]]) -> Iterator[str]:
         counts = ", ".join(f"{n} {status}" for status, n in sums.items())
         yield (
             f"{count(total, 'joint position')}: {counts}; the fewest tracked are those of {worst}, {n_tracked} of "
-            f"{n_frames} frames; joints.csv has the status of each"
+            f"{count(n_frames, 'frame')}; joints.csv has the status of each"
         )
 
 

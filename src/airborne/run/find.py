@@ -163,8 +163,9 @@ def _ask_for_help(
     else:
         reason = f"{len(finding.candidates)} poses in frame {frame} look alike, the likeliest {best.probability:.0%}"
     advice = (
-        f"look at {folder / CANDIDATES_PICTURE}{sides} (where the outlines miss the body in one camera, its video may "
-        "be another's), then give --take 1 (or another number), or the pose under [start]"
+        f"look at {folder / CANDIDATES_PICTURE}{sides}; where the outlines miss the body in one camera, its video may "
+        "be another's, or its clock off (`airborne sync`); then give --take 1 (or another number), or the pose under "
+        "[start]"
     )
     said = "; ".join([reason, *doubts, advice]).replace("?; ", "? ")
     return UndecidedError(f"{trial.name}: the start is undecided: {said}")
