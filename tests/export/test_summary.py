@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airborne.export import body_warnings, headline, write_json
-from airborne.export.summary import joint_warnings, json_ready
+from airborne.export.summary import is_hardly_tracked, is_mostly_untracked, joint_warnings, json_ready
 from airborne.motion import Motion
 from tests.support.export_scenes import run
 from tests.support.tolerances import ROUNDTRIP
@@ -129,3 +129,9 @@ def test_a_run_of_which_less_than_half_is_tracked_says_so():
     head = json_ready(headline(run())) | {"n_frames": 9, "n_tracked": 4, "n_uncertain": 5}
     assert any("Only 4 of 9 frames are tracked" in warning for warning in body_warnings(head))
     assert not any("Only" in warning for warning in body_warnings(head | {"n_tracked": 5, "n_uncertain": 4}))
+
+
+def test_of_players_the_one_who_is_tracked_best_tells_whether_a_run_says_anything():
+    head = {"n_frames": 40, "n_tracked": 0, "players": {"a": {"n_tracked": 40}, "b": {"n_tracked": 0}}}
+    assert not is_mostly_untracked(head) and not is_hardly_tracked(head)
+    assert is_mostly_untracked({**head, "players": {}}) and is_hardly_tracked({**head, "players": {}})

@@ -114,9 +114,9 @@ def track_command(
         if run.was_finished:
             print(f"{output} holds this run, finished; nothing was tracked again (--overwrite tracks it anew)")
         print(f"{_describe(run.summary, output)}\nresults: {_describe_results(output)}")
-    from airborne.export.summary import is_hardly_tracked
+    from airborne.export.summary import count_tracked, is_hardly_tracked
 
-    is_found = run.summary["n_tracked"] or (first_frame and run.summary.get("n_uncertain"))
+    is_found = count_tracked(run.summary) or (first_frame and run.summary.get("n_uncertain"))
     if not is_found or is_hardly_tracked(run.summary):
         raise typer.Exit(1)
 

@@ -83,13 +83,21 @@ def headline(motion: Motion) -> dict[str, Any]:
 
 
 def is_mostly_untracked(head: Mapping[str, Any]) -> bool:
-    """Whether less than half of a run's frames are tracked, so that nothing can be said of it as a whole."""
-    return bool(head["n_tracked"] < MOST_UNTRACKED * head["n_frames"])
+    """Whether less than half of a run's frames are tracked, so that nothing can be said of it as a whole.
+
+    Of players that is said of the one who is tracked best.
+    """
+    return bool(count_tracked(head) < MOST_UNTRACKED * head["n_frames"])
 
 
 def is_hardly_tracked(head: Mapping[str, Any]) -> bool:
     """Whether of several frames a tenth or less are tracked, so that the run says nothing."""
-    return head["n_frames"] > 1 and bool(head["n_tracked"] <= _HARDLY_ANY * head["n_frames"])
+    return head["n_frames"] > 1 and bool(count_tracked(head) <= _HARDLY_ANY * head["n_frames"])
+
+
+def count_tracked(head: Mapping[str, Any]) -> int:
+    """Return in how many frames the body is tracked, or the player who is tracked best."""
+    return max((each["n_tracked"] for each in head.get("players", {}).values()), default=head["n_tracked"])
 
 
 def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
