@@ -43,15 +43,19 @@ _SOLE_LEVEL = Rotation.from_euler("x", FOOT_SLOPE_RAD - np.pi / 2).as_matrix()
 
 
 def require_athlete(stature_m: float, mass_kg: float) -> None:
-    """Raise BodyError for a stature or a mass that no athlete has."""
+    """Raise BodyError for a stature or a mass that no athlete has, or both."""
+    wrong = []
     for value, (low, high), name, unit in (
         (stature_m, _STATURES_M, "stature_m", "metres"),
         (mass_kg, _MASSES_KG, "mass_kg", "kilograms"),
     ):
         if not low <= value <= high:
-            is_cm = unit == "metres" and low <= value / 100 <= high
-            hint = f": is it in centimetres? give {value / 100:g}" if is_cm else ""
-            raise BodyError(f"{name} is {value:g}; expected {low:g} to {high:g} {unit}{hint}")
+            smaller, factor = ("centimetres", 100) if unit == "metres" else ("grams", 1000)
+            is_meant = low <= value / factor <= high
+            hint = f": is it in {smaller}? give {value / factor:g}" if is_meant else ""
+            wrong.append(f"{name} is {value:g}; expected {low:g} to {high:g} {unit}{hint}")
+    if wrong:
+        raise BodyError("; ".join(wrong))
 
 
 def measurements_of(stature_m: float, mass_kg: float) -> Measurements:

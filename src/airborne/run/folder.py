@@ -131,7 +131,12 @@ def _describe_change(name: str, recorded: Mapping[str, Any], identity: Mapping[s
     differing = [key for key in {**before, **now} if before.get(key) != now.get(key)]
     if name == "settings":
         return "; ".join(f"{key} = {before.get(key)}, now {now.get(key)}" for key in differing)
-    return f"other {', '.join(differing)}" if name == "inputs" else f"other {name}"
+    if name != "inputs":
+        return f"other {name}"
+    gone, added = ([key for key in each if key not in other] for each, other in ((before, now), (now, before)))
+    changed = [key for key in differing if key in before and key in now]
+    parts = (("other ", changed), ("without ", added), ("with ", gone))
+    return "; ".join(f"{word}{', '.join(keys)}" for word, keys in parts if keys)
 
 
 def stretches_between(recorded: dict[str, Any], identity: dict[str, Any]) -> list[tuple[float, float]]:
