@@ -109,7 +109,7 @@ def test_a_body_with_joints_gets_their_angles_and_its_flight_and_another_does_no
         "<h2>Centre of mass and angular momentum</h2>",
         "<dt>Joint angles</dt>",
         "a free fall [mm]",
-        "mean over the frames, standard deviation of a frame",
+        "mean over the frames, standard deviation of one",
         "scatter of the frames about x",
     )
     assert [word for word in words if word not in html] == []

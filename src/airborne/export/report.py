@@ -278,10 +278,7 @@ def _flight_table(flight: Mapping[str, Any]) -> HtmlTable:
     names = ("angular_momentum_kg_m2_s", "angular_momentum_sd_kg_m2_s", "angular_momentum_spread_kg_m2_s")
     mean, sd, scatter = (flight[name] for name in names)
     rows = [
-        (
-            f"angular momentum about {axis} [kg m²/s]: mean over the frames, standard deviation of a frame",
-            *pair,
-        )
+        (f"angular momentum about {axis} [kg m²/s]: mean over the frames, standard deviation of one", *pair)
         for axis, *pair in zip("xyz", mean, sd, strict=True)
     ]
     rows += [

@@ -81,7 +81,7 @@ def test_axes_turned_round_leave_the_camera_on_its_side(points, sizes):
 
 
 def test_points_outside_the_image_are_counted_and_named(points, sizes):
-    assert "1 control point outside its 768×576 image (first 'P03' at u=900, v=154.43)" in error_of(
+    assert "1 point outside its 768×576 image (first 'P03' at u=900, v=154.43)" in error_of(
         clicked(points, "cam1", lambda px: np.where(np.arange(24)[:, None] == 2, [900, 154.43], px)), sizes
     )
 

@@ -60,7 +60,7 @@ def check_points(points: ControlPoints, sizes: Mapping[str, Size]) -> None:
                 f"camera '{camera}' sees {is_seen.sum()} control points, at least {FEWEST_DLT_POINTS} are needed: "
                 "click more"
             )
-        _check_inside(points, camera, sizes)
+        check_inside(points, camera, sizes)
         ratio = flatness(points.world[is_seen])
         if ratio < _FLAT_ERROR:
             raise CalibrationError(
@@ -90,14 +90,15 @@ def _other_units(extent: float) -> str:
     return f"they would span {', '.join(plausible)}" if plausible else "correct x_m, y_m, z_m"
 
 
-def _check_inside(points: ControlPoints, camera: str, sizes: Mapping[str, Size]) -> None:
+def check_inside(points: ControlPoints, camera: str, sizes: Mapping[str, Size]) -> None:
+    """Raise CalibrationError where points lie outside a camera's image, and say which size would hold them."""
     px, size = points.px[:, points.cameras.index(camera)], sizes[camera]
     outside = is_outside(px, size)
     if not outside.any():
         return
     first, n = int(np.flatnonzero(outside)[0]), int(outside.sum())
     what = (
-        f"camera '{camera}': {count(n, 'control point')} outside its {size[0]}×{size[1]} image "
+        f"camera '{camera}': {count(n, 'point')} outside its {size[0]}×{size[1]} image "
         f"(first '{points.names[first]}' at u={px[first, 0]:g}, v={px[first, 1]:g})"
     )
     if is_turned(px, size):

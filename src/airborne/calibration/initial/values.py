@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from airborne.calibration.bundle import FreeParameters
+from airborne.calibration.diagnosis.control_points import check_inside
 from airborne.calibration.diagnosis.images import check_image_size
 from airborne.calibration.initial.chaining import Views, chain_cameras
 from airborne.calibration.initial.mirrored import find_mirrored_cameras
@@ -66,6 +67,9 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
         points["control points"] = read_control_points(sources.path(sources.control_points.file))
     if sources.court is not None:
         points["court"] = read_control_points(sources.path(sources.court.file), court_points(sources.court.net))
+    for table in points.values():
+        for camera in _common(table.cameras, sizes):
+            check_inside(table, camera, sizes)
     found = find_wand(sources, sizes, lambda done, n: progress("looking for the wand", done, n))
     wand = None if found is None else found.tracks
     fisheyes = [camera.name for camera in sources.camera if camera.lens == "fisheye"]
