@@ -62,14 +62,7 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     lenses = _fit_lenses(
         sources, board_detections=board_detections, lens_views=lens_views, sizes=sizes, progress=progress
     )
-    points = {}
-    if sources.control_points is not None:
-        points["control points"] = read_control_points(sources.path(sources.control_points.file))
-    if sources.court is not None:
-        points["court"] = read_control_points(sources.path(sources.court.file), court_points(sources.court.net))
-    for table in points.values():
-        for camera in _common(table.cameras, sizes):
-            check_inside(table, camera, sizes)
+    points = _read_points(sources, sizes)
     found = find_wand(sources, sizes, lambda done, n: progress("looking for the wand", done, n))
     wand = None if found is None else found.tracks
     fisheyes = [camera.name for camera in sources.camera if camera.lens == "fisheye"]
@@ -252,6 +245,19 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
         chain_cameras([known_lenses[views.cameras[c]] for c in group], views.select_cameras(group))[0]
         for group in groups
     ]
+
+
+def _read_points(sources: Sources, sizes: Mapping[str, Size]) -> dict[str, ControlPoints]:
+    """Read the points of known places; raises CalibrationError where one lies outside its image."""
+    points = {}
+    if sources.control_points is not None:
+        points["control points"] = read_control_points(sources.path(sources.control_points.file))
+    if sources.court is not None:
+        points["court"] = read_control_points(sources.path(sources.court.file), court_points(sources.court.net))
+    for table in points.values():
+        for camera in _common(table.cameras, sizes):
+            check_inside(table, camera, sizes)
+    return points
 
 
 def _common(cameras: tuple[str, ...], sizes: dict[str, tuple[int, int]]) -> list[str]:
