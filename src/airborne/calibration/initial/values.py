@@ -247,7 +247,7 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
     ]
 
 
-def _read_points(sources: Sources, sizes: Mapping[str, Size]) -> dict[str, ControlPoints]:
+def _read_points(sources: Sources, sizes: dict[str, tuple[int, int]]) -> dict[str, ControlPoints]:
     """Read the points of known places; raises CalibrationError where one lies outside its image."""
     points = {}
     if sources.control_points is not None:
