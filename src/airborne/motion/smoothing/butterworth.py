@@ -15,6 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from airborne.errors import ResultError
+from airborne.motion.smoothing.kalman import path_errors
 from airborne.motion.smoothing.propagation import apply_operator
 from airborne.motion.smoothing.segments import SmoothedPaths
 from airborne.types import Array
@@ -107,7 +108,8 @@ def butterworth_smoother(
         even = values if is_complete else CubicSpline(known_s, values)(inside_s)
         return _with_derivatives(inside_s, low_pass(even, cutoff_hz=cutoff_hz, rate_hz=rate_hz), at_s)
 
-    return apply_operator(operator, time_s, values, covariance, are_errors_slow=are_errors_slow)
+    errors = path_errors(time_s, values, covariance, are_slow=are_errors_slow)
+    return apply_operator(operator, time_s, values, covariance, errors)
 
 
 def _with_derivatives(even_s: Array, filtered: Array, at_s: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.motion.smoothing.kalman import PathErrors, error_correlations, path_errors
+from airborne.motion.smoothing.kalman import PathErrors, error_correlations
 from airborne.motion.smoothing.segments import MIN_FRAMES, SmoothedPaths, finite_rows
 from airborne.types import Array
 
@@ -25,13 +25,12 @@ class Operator(Protocol):
 
 
 def apply_operator(
-    operator: Operator, time_s: Array, values: Array, covariance: Array, *, are_errors_slow: bool
+    operator: Operator, time_s: Array, values: Array, covariance: Array, errors: PathErrors | None
 ) -> SmoothedPaths:
     """Apply an operator to the known rows of a stretch (n, k), with standard deviations from the variances."""
     is_known = finite_rows(values)
     smooth = operator(time_s[is_known], values[is_known], time_s)
     variance = np.diagonal(covariance, axis1=1, axis2=2)
-    errors = path_errors(time_s, values, covariance, are_slow=are_errors_slow)
     sd = np.empty_like(smooth)
     done: list[int] = []
     for k in range(values.shape[1]):

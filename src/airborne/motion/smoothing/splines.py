@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BSpline, make_smoothing_spline
 
+from airborne.motion.smoothing.kalman import path_errors
 from airborne.motion.smoothing.propagation import Operator, apply_operator
 from airborne.motion.smoothing.segments import SmoothedPaths
 from airborne.types import Array
@@ -29,12 +30,12 @@ def spline_smoother(time_s: Array, values: Array, covariance: Array, *, are_erro
     """
     is_known = np.isfinite(values).all(axis=1)
     variance = np.diagonal(covariance, axis1=1, axis2=2)
+    errors = path_errors(time_s, values, covariance, are_slow=are_errors_slow)
     parts = []
     for k in range(values.shape[1]):
         one = slice(k, k + 1)
         operator = _fit_operator(time_s[is_known], values[is_known, k], _weights(variance[is_known, k]))
-        own = values[:, one], covariance[:, one, one]
-        parts.append(apply_operator(operator, time_s, *own, are_errors_slow=are_errors_slow))
+        parts.append(apply_operator(operator, time_s, values[:, one], covariance[:, one, one], errors))
     for part in parts:
         part.acceleration[[0, -1]] = part.acceleration_sd[[0, -1]] = np.nan
     return SmoothedPaths(*(np.hstack([getattr(part, name) for part in parts]) for name in SmoothedPaths.__slots__))
