@@ -23,14 +23,7 @@ from airborne.motion.run_folder import JOINTS, JUMPS, figures_of, tables_of, vid
 from airborne.motion.untracked_players import has_untracked_player, without_untracked
 from airborne.run.opening import Opened
 from airborne.run.players_cameras import CameraCheck
-from airborne.run.players_tracker import (
-    MOST_ABOVE_FLOOR_M,
-    doubt_starts,
-    height_m,
-    player_starts,
-    players_tracker_of,
-    start_notes,
-)
+from airborne.run.players_tracker import doubt_starts, player_starts, players_tracker_of, start_notes
 from airborne.tracking import Status
 from airborne.tracking.capsules import Blocker
 from airborne.tracking.capsules.status import UNCERTAIN_SD_M as BLOCKER_SD_M
@@ -66,7 +59,7 @@ class PlayersRun:
     players: PlayersTracker
     starts: tuple[PlayerStart, ...]
     cameras: CameraCheck = field(default_factory=CameraCheck)  # grows while the run is tracked
-    doubtful: frozenset[str] = frozenset()  # players whose starts the first images contradict
+    doubtful: tuple[str, ...] = ()  # players whose starts cannot be believed
 
     table = JOINTS
 
@@ -97,11 +90,10 @@ class PlayersRun:
 
     def see(self, first: Frames) -> PlayersRun:
         """Return the players with doubts of their starts; their trackers learn from the first frames themselves."""
-        if not isinstance(self.recording, Recording):  # live, where frames do not wait
-            return self
-        doubts = doubt_starts(self.starts, first)
+        is_live = not isinstance(self.recording, Recording)  # then frames do not wait
+        doubts = doubt_starts(self.starts, None if is_live else first)
         self.recording.events.extend(doubts.values())
-        return replace(self, doubtful=frozenset(doubts))
+        return replace(self, doubtful=tuple(doubts))
 
     def track(
         self,
@@ -151,8 +143,7 @@ class PlayersRun:
     ) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
         written = read_players(folder / self.table)
-        floating = [start.name for start in self.starts if start.has_legs and height_m(start) > MOST_ABOVE_FLOOR_M]
-        tracked = written.without_tracked([*floating, *self.doubtful])
+        tracked = written.without_tracked(self.doubtful)
         motion = without_untracked(tracked)
         wrong = find_wrong_gravity(motion)
         if wrong is not None:

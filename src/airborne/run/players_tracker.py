@@ -28,7 +28,7 @@ from airborne.video import Frames, View
 
 _CLEARLY = 0.5  # cosine of lines from right to left; chosen so that a pelvis may turn 60 degrees over the legs
 _LEAST_APART_M = 0.15  # chosen: the middles of two trunks, each 0.2 m deep or more, are farther from each other
-MOST_ABOVE_FLOOR_M = 0.25  # of the lower ankle; chosen: twice as high as where people stand, calibrations a few cm off
+_MOST_ABOVE_FLOOR_M = 0.25  # of the lower ankle; chosen: twice as high as where people stand, calibrations a few cm off
 _AWAY = np.array([0, -4.0, 0])  # of the artificial cameras [m]
 _TORSO_COLUMNS = ("player", "frame", "x_m", "y_m", "z_m")
 _LARGEST_TABLE_BYTES = 50_000_000  # larger files are refused
@@ -82,22 +82,12 @@ def _check_apart(trial: Trial, starts: Sequence[PlayerStart]) -> None:
             )
 
 
-def height_m(start: PlayerStart) -> float:
-    """Return how high the lower ankle of a player with legs is at the start."""
-    return float(min(start.joints_m["ankle_left"][2], start.joints_m["ankle_right"][2]))
-
-
 def start_notes(starts: Sequence[PlayerStart]) -> list[str]:
     """Say of each player of whose hips, knees and ankles one pair points against both others that it may be crossed."""
     notes = []
     for start in starts:
         if not start.has_legs:
             continue
-        if (over_m := height_m(start)) > MOST_ABOVE_FLOOR_M:
-            notes.append(
-                f"player '{start.name}': both ankles lie {over_m:.2f} m or more over the floor, z = 0, so no frame "
-                "counts as tracked: start where the player stands, or correct the joints or the floor"
-            )
         pairs = {
             f"{part}s": start.joints_m[f"{part}_left"] - start.joints_m[f"{part}_right"]
             for part in ("hip", "knee", "ankle")
@@ -118,16 +108,27 @@ def start_notes(starts: Sequence[PlayerStart]) -> list[str]:
 
 
 def doubt_starts(starts: Sequence[PlayerStart], first: Frames | None) -> dict[str, str]:
-    """Say of whom the images of the first frame show the legs elsewhere than the start, by the players' names."""
+    """Say whose start cannot be believed, by the players' names: in the air, or elsewhere than the first images show.
+
+    first: None where no image is looked at.
+    """
     with_legs = [start for start in starts if start.has_legs]
-    misses_m = [] if first is None else start_misses_m(with_legs, first)
-    return {
-        start.name: f"player '{start.name}': the images of the first frame show hips, knees and ankles "
-        f"{100 * miss_m:.0f} cm from where [[start.player]] has them, so no frame counts as tracked: are they of this "
-        "frame and player, and at the right height?"
-        for start, miss_m in zip(with_legs, misses_m, strict=False)
-        if miss_m > MOST_MISS_M
-    }
+    misses_m = np.full(len(with_legs), np.nan) if first is None else start_misses_m(with_legs, first)
+    doubts = {}
+    for start, miss_m in zip(with_legs, misses_m, strict=True):
+        over_m = min(start.joints_m["ankle_left"][2], start.joints_m["ankle_right"][2])
+        if over_m > _MOST_ABOVE_FLOOR_M:
+            doubts[start.name] = (
+                f"player '{start.name}': both ankles lie {over_m:.2f} m or more over the floor, z = 0, so no frame "
+                "counts as tracked: start where the player stands, or correct the joints or the floor"
+            )
+        elif miss_m > MOST_MISS_M:
+            doubts[start.name] = (
+                f"player '{start.name}': the images of the first frame show hips, knees and ankles "
+                f"{100 * miss_m:.0f} cm from where [[start.player]] has them, so no frame counts as tracked: are they "
+                "of this frame and player, and at the right height?"
+            )
+    return doubts
 
 
 def _cosine(a: Array, b: Array) -> float:
