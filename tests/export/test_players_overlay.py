@@ -183,10 +183,10 @@ def test_letters_stand_on_their_line_with_their_width_and_holes():
 
 
 def test_names_that_would_overlap_stand_above_each_other():
-    first = place_name(10, 50, 60, 12, [])
-    second = place_name(40, 48, 60, 12, [first])
-    third = place_name(30, 52, 60, 12, [first, second])
+    first = place_name(10, 50, (60, 12), [])
+    second = place_name(40, 48, (60, 12), [first])
+    third = place_name(30, 52, (60, 12), [first, second])
     assert first == (10, 38, 70, 50)
     assert second == (40, 26, 100, 38)
     assert third == (30, 14, 90, 26)
-    assert place_name(200, 50, 60, 12, [first, second, third]) == (200, 38, 260, 50)
+    assert place_name(200, 50, (60, 12), [first, second, third]) == (200, 38, 260, 50)

@@ -123,13 +123,14 @@ def _draw_rods(
         highest = np.concatenate(drawn)
         x, y = highest[np.argmin(highest[:, 1])]
         size_px = image.shape[0] * _NAME_SHARE
-        box = place_name(x, y - size_px / 2, text_width(player, size_px=size_px), size_px, names)
+        box = place_name(x, y - size_px / 2, (text_width(player, size_px=size_px), size_px), names)
         names.append(box)
         draw_text(image, player, (box[0], box[3]), size_px=size_px, rgb=_rgb(worst_status(statuses)))
 
 
-def place_name(left: float, bottom: float, width: float, height: float, taken: Sequence[_Box]) -> _Box:
-    """Return a name's box (left, top, right, bottom) [px], moved up until it is clear of those taken."""
+def place_name(left: float, bottom: float, size: tuple[float, float], taken: Sequence[_Box]) -> _Box:
+    """Return the box of a name of some width and height [px], moved up until it is clear of those taken."""
+    width, height = size
     box = left, bottom - height, left + width, bottom
     for other in sorted(taken, key=lambda each: -each[3]):
         if box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]:

@@ -109,7 +109,7 @@ def butterworth_smoother(
         return _with_derivatives(inside_s, low_pass(even, cutoff_hz=cutoff_hz, rate_hz=rate_hz), at_s)
 
     errors = path_errors(time_s, values, covariance, are_slow=are_errors_slow)
-    return apply_operator(operator, time_s, values, covariance, errors)
+    return apply_operator(operator, time_s, values, covariance, errors=errors)
 
 
 def _with_derivatives(even_s: Array, filtered: Array, at_s: Array) -> Array:

@@ -25,7 +25,7 @@ class Operator(Protocol):
 
 
 def apply_operator(
-    operator: Operator, time_s: Array, values: Array, covariance: Array, errors: PathErrors | None
+    operator: Operator, time_s: Array, values: Array, covariance: Array, *, errors: PathErrors | None
 ) -> SmoothedPaths:
     """Apply an operator to the known rows of a stretch (n, k), with standard deviations from the variances."""
     is_known = finite_rows(values)
@@ -38,14 +38,14 @@ def apply_operator(
         sd[:, :, k] = (
             sd[:, :, same]
             if same is not None
-            else _standard_deviations(operator, time_s, is_known, variance[:, k], errors)
+            else _standard_deviations(operator, time_s, is_known, variance[:, k], errors=errors)
         )
         done.append(k)
     return SmoothedPaths(*smooth, *sd)
 
 
 def _standard_deviations(
-    operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array, errors: PathErrors | None
+    operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array, *, errors: PathErrors | None
 ) -> Array:
     """Return the sd (3, n) of one path; NaN where it depends on an unknown or infinite variance (n,)."""
     n = len(time_s)
@@ -59,14 +59,14 @@ def _standard_deviations(
         last = known_rows[np.searchsorted(known_rows, min(stop + _MARGIN, n) - 1)]
         rows = slice(int(first), int(last) + 1)
         inner = slice(start - rows.start, stop - rows.start)
-        sd[:, start:stop] = _block_sd(operator, time_s[rows], is_known[rows], variance[rows], errors)[:, inner]
+        sd[:, start:stop] = _block_sd(operator, time_s[rows], is_known[rows], variance[rows], errors=errors)[:, inner]
         if stop == n:
             break
     return sd
 
 
 def _block_sd(
-    operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array, errors: PathErrors
+    operator: Operator, time_s: Array, is_known: NDArray[np.bool_], variance: Array, *, errors: PathErrors
 ) -> Array:
     known_s, variance = time_s[is_known], variance[is_known]
     if len(known_s) < MIN_FRAMES:

@@ -35,7 +35,7 @@ def spline_smoother(time_s: Array, values: Array, covariance: Array, *, are_erro
     for k in range(values.shape[1]):
         one = slice(k, k + 1)
         operator = _fit_operator(time_s[is_known], values[is_known, k], _weights(variance[is_known, k]))
-        parts.append(apply_operator(operator, time_s, values[:, one], covariance[:, one, one], errors))
+        parts.append(apply_operator(operator, time_s, values[:, one], covariance[:, one, one], errors=errors))
     for part in parts:
         part.acceleration[[0, -1]] = part.acceleration_sd[[0, -1]] = np.nan
     return SmoothedPaths(*(np.hstack([getattr(part, name) for part in parts]) for name in SmoothedPaths.__slots__))
