@@ -9,7 +9,7 @@ from numba.core.dispatcher import Dispatcher
 
 from airborne.appearance import light_planes
 from airborne.appearance.brightness import _count_ratios
-from airborne.motion.smoothing import kalman
+from airborne.motion.smoothing import state_space
 from airborne.run import warm
 from airborne.run.warm import read_images, smooth_a_path
 from airborne.video import crops
@@ -44,4 +44,4 @@ def test_whole_images_and_parts_are_read_as_all_types_that_occur():
     planes = {(str(image.dtype), image.layout) for image, *_ in light_planes.signatures}
     assert planes >= set(product(("uint8", "float32"), "AC"))
     assert {(image.layout, known.layout) for image, known, *_ in _count_ratios.signatures} >= set(product("AC", "AC"))
-    assert all(kernel.signatures for kernel in (crops._convert, kalman._filter_kernel))
+    assert all(kernel.signatures for kernel in (crops._convert, state_space._filter_kernel))

@@ -130,7 +130,7 @@ def test_a_fall_that_no_size_explains_tells_of_a_wrong_rate(rate, said):
     found = find_wrong_flight(*thrown(40, rate), known(40))
     assert (found is None) == (said is None)
     if found is not None:
-        assert said in found.sentence and f"{rate / 25:.2f} of that" in found.sentence
+        assert said in found.sentence and f"{rate / 25:.2f} times that" in found.sentence
         assert found.gravity_m_s2 == pytest.approx(9.81 * (rate / 25) ** 2, rel=0.01) and found.to_dict()["is_alarm"]
 
 
@@ -165,7 +165,7 @@ def test_a_wrong_rate_is_named_in_a_world_that_is_not_level_too():
     time_s, position, R = thrown(40, 12.5)
     world = Rotation.from_euler("x", 5, degrees=True).as_matrix()
     found = find_wrong_flight(time_s, position @ world.T, world @ R, known(40))
-    assert found is not None and "0.50 of that" in found.sentence
+    assert found is not None and "0.50 times that" in found.sentence
 
 
 def test_a_world_upside_down_is_named():

@@ -9,9 +9,10 @@ import numpy as np
 
 from airborne.body.legs import LEG_POINTS
 from airborne.errors import TrialError
-from airborne.tracking.capsules.bystanders import occluding_capsules
+from airborne.tracking.capsules.bystanders import LEAST_EVIDENCE, occluding_capsules
 from airborne.tracking.capsules.first_frame import fit_first_frame, points_of, start_state
 from airborne.tracking.capsules.jumper import JOINTS
+from airborne.tracking.capsules.track import evidence_per_px
 from airborne.tracking.players import PlayerStart
 from airborne.types import Array
 from airborne.video import Frames
@@ -25,7 +26,7 @@ _LOOSER, _FREER, MOST_MISS_M = 6.0, 4.0, 0.05
 def start_misses_m(starts: Sequence[PlayerStart], frames: Frames) -> Array:
     """Return how far the images put hips, knees and ankles from where each start with legs has them: (players,) [m].
 
-    The mean of the six; NaN of a player whom no image shows. About 0.1 s a player.
+    The mean of the six; NaN where the images show nobody there. About 0.1 s a player.
     """
     misses_m = np.full(len(starts), np.nan)
     states = [start_state(start.name, start.joints_m) for start in starts]
@@ -34,6 +35,8 @@ def start_misses_m(starts: Sequence[PlayerStart], frames: Frames) -> Array:
         with suppress(TrialError):
             args = start.name, start.joints_m, frames, others
             fitted = fit_first_frame(*args, looser=_LOOSER, freer=_FREER, start=state)
+            if evidence_per_px(fitted.fit.owned) <= LEAST_EVIDENCE:
+                continue
             found = points_of(fitted.fit.state)[[JOINTS.index(name) for name in LEG_POINTS]]
             given = np.array([start.joints_m[name] for name in LEG_POINTS])
             misses_m[i] = np.linalg.norm(found - given, axis=1).mean()
