@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from airborne.errors import count_of
+from airborne.export.summary import describe_lost
 from airborne.motion.jumps.jump import are_legs_lost, is_no_fall
 from airborne.motion.jumps.standing_posture import NEAR_S, WINDOW_S
 
@@ -42,14 +43,13 @@ def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Itera
         yield "found in no frame: nothing was measured"
         return
     if player["n_lost"]:
-        holds = "it holds" if player["n_lost"] == 1 else "they hold"
-        yield f"{count_of(player['n_lost'], n, 'frame')} lost; {holds} no numbers"
+        yield describe_lost(player["n_lost"], n)
     if doubts := player.get("doubts"):
         yield f"uncertain are {'; '.join(doubts)}; look at them before use"
     elif player["n_uncertain"]:
         yield f"{count_of(player['n_uncertain'], n, 'frame')} uncertain; look at them before use"
-    if player["n_below_two_cameras"]:
-        few, rest = player["n_below_two_cameras"], "rests" if player["n_below_two_cameras"] == 1 else "rest"
+    if few := player["n_below_two_cameras"]:
+        rest = "rests" if few == 1 else "rest"
         yield f"{few} of {n} frames {rest} on fewer than two cameras, so that depth is a guess"
     n_posed = player["n_tracked"] + player["n_uncertain"]
     if not player["n_tracked"] and not summary.get("self_check"):  # which says why

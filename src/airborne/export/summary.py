@@ -100,14 +100,18 @@ def count_tracked(head: Mapping[str, Any]) -> int:
     return max((each["n_tracked"] for each in head.get("players", {}).values()), default=head["n_tracked"])
 
 
+def describe_lost(n_lost: int, n_frames: int) -> str:
+    """Say how many of a run's frames are lost."""
+    return f"{count_of(n_lost, n_frames, 'frame')} lost; {'it holds' if n_lost == 1 else 'they hold'} no numbers"
+
+
 def body_warnings(head: Mapping[str, Any]) -> Iterator[str]:
     """Yield, in plain sentences, what the reader of a `headline` must not miss; nothing if every frame is tracked."""
     n, n_posed = head["n_frames"], head["n_tracked"] + head["n_uncertain"]
     if not n_posed:
         yield "The body was found in no frame: this run measured nothing."
     elif head["n_lost"]:
-        holds = "it holds" if head["n_lost"] == 1 else "they hold"
-        yield f"{count_of(head['n_lost'], n, 'frame')} lost; {holds} no numbers."
+        yield f"{describe_lost(head['n_lost'], n)}."
     if n > 1 and n_posed and not head["n_tracked"]:
         yield "No frame was tracked: none of these numbers can be relied on."
     elif is_mostly_untracked(head):

@@ -187,10 +187,10 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
         if tracker is not None:
             starts = player_starts(trial, recording.rig)
             recording.events.extend(start_notes(starts))
+            begun = next(iter(first), None)
             if len(recording.rig) > 1:
-                checks.attempt(lambda: refuse_players_mix_ups(starts, recording), lambda _: _NO_MIX_UP)
-            with closing(iter(recording)) as frames:
-                checks.doubts += doubt_starts(starts, next(frames, None)).values()
+                checks.attempt(lambda: refuse_players_mix_ups(starts, begun), lambda _: _NO_MIX_UP)
+            checks.doubts += doubt_starts(starts, begun).values()
     else:
         model = trial.model()
         found = checks.attempt(

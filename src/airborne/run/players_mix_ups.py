@@ -8,7 +8,6 @@ more than what moves, which may be little before a jump.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from airborne.tracking.capsules.track import evidence_per_px
 from airborne.tracking.capsules.tracker import fit_starts
 from airborne.tracking.players import PlayerStart
 from airborne.types import Array
-from airborne.video import Frames, Recording
+from airborne.video import Frames
 
 # times the evidence as named, nats a pixel, and share of cameras that show each player, of the images as they would be
 # without a mix-up. Chosen on twelve synthetic blocks of 9001 to 9103 and block_jump: of 72 mix-ups 62 are named, and in
@@ -30,10 +29,8 @@ _MORE, _LEAST_EVIDENCE, _LEAST_SHOWN = 1.3, 1.5, 0.5
 _MANY = 10.0  # chosen: times, of which the figure says nothing more
 
 
-def refuse_players_mix_ups(starts: Sequence[PlayerStart], recording: Recording) -> None:
+def refuse_players_mix_ups(starts: Sequence[PlayerStart], first: Frames | None) -> None:
     """Raise MistakesError, naming the cameras, where the players fit the first images of other cameras better."""
-    with closing(iter(recording)) as frames:
-        first = next(frames, None)
     finding = None if first is None else players_mix_up_in(starts, first)
     if finding is not None:
         raise MistakesError("the videos", [finding.sentence])

@@ -158,13 +158,11 @@ def check_run(
 
 def looks_unlike(scores: Array, first: int) -> NDArray[np.bool_]:
     """Tell which frames from the first tracked one on look unlike the pictures, by scores (n,) of a whole run: (n,)."""
-    is_unlike = (
-        scores > _UNLIKE_SHARE * np.nanmedian(scores) if np.isfinite(scores).any() else np.zeros(len(scores), bool)
-    )
-    later = np.flatnonzero(~is_unlike[first:])
-    is_first = np.zeros(len(scores), bool)
-    is_first[first : first + int(later[0]) if len(later) else None] = True
-    return is_first & is_unlike
+    is_unlike = np.zeros(len(scores), bool)
+    if np.isfinite(scores).any():
+        of_later = scores[first:] > _UNLIKE_SHARE * np.nanmedian(scores)
+        is_unlike[first:] = np.logical_and.accumulate(of_later)
+    return is_unlike
 
 
 def widen_by_fall(motion: Motion, fall: WrongFall) -> Motion:

@@ -166,7 +166,8 @@ def _open_players(trial: Trial, options: _Options, stack: ExitStack) -> PlayersR
     opened.recording.events.extend([] if found is None else found.notes)
     players = PlayersRun.open(trial, opened)
     if isinstance(opened.recording, Recording):
-        refuse_players_mix_ups(players.starts, opened.recording)
+        with closing(iter(opened.recording)) as frames:
+            refuse_players_mix_ups(players.starts, next(frames, None))
     return players
 
 

@@ -37,7 +37,7 @@ _LOG_DENSITY = (-6.0, 12.0)  # search range: powers of ten of q over the scale o
 _LOG_STEP = 0.02  # tolerance of the search, powers of ten
 _UNOBSERVED_SD = 0.15  # [unit] of a direction with an infinite variance: `tracking.covariance` states none beyond
 _WHITE_JERK = np.array([[20.0, 8.0, 6.0], [8.0, 3.0, 2.0], [6.0, 2.0, 1.0]])  # divisors of its discrete noise
-_FEWEST = 3  # rows that tell a path with an acceleration
+_FEWEST = 3  # rows: a parabola has as many numbers
 _LEAST_VARIANCE = 1e-12  # [unit2] keeps roots and logarithms finite
 
 
@@ -48,7 +48,7 @@ def kalman_smoother(time_s: Array, values: Array, covariance: Array, *, are_erro
     covariance is known. Missing rows are predicted from both sides. The standard deviations are those of the fast
     errors after smoothing, and of the slow ones.
     """
-    measured = _measured(values, covariance)
+    measured = _measurements(values, covariance)
     if measured is None:
         return SmoothedPaths.unknown(values.shape)
     values, noise = measured
@@ -67,7 +67,7 @@ def kalman_smoother(time_s: Array, values: Array, covariance: Array, *, are_erro
     return SmoothedPaths(value[:, 0], value[:, 1], value[:, 2], sd[:, 0], sd[:, 1], sd[:, 2])
 
 
-def _measured(values: Array, covariance: Array) -> tuple[Array, MeasurementNoise] | None:
+def _measurements(values: Array, covariance: Array) -> tuple[Array, MeasurementNoise] | None:
     """Return values (n, k), NaN where they or their errors are unknown, and the errors; None of fewer than three."""
     noise = measurement_noise(covariance)
     is_measured = finite_rows(values) & finite_rows(noise.root.reshape(len(values), -1))
@@ -79,7 +79,7 @@ def _measured(values: Array, covariance: Array) -> tuple[Array, MeasurementNoise
 
 def path_errors(time_s: Array, values: Array, covariance: Array, *, are_slow: bool) -> PathErrors | None:
     """Return the likeliest errors of a path (n, k); None where hardly any of its covariances is known."""
-    measured = _measured(values, covariance)
+    measured = _measurements(values, covariance)
     return None if measured is None else maximum_likelihood(time_s, *measured, are_slow=are_slow)
 
 

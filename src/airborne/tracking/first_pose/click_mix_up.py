@@ -13,7 +13,7 @@ from airborne.types import Array
 _FEWEST = 4  # chosen: points seen by two cameras or more, of which a few could meet by chance
 _MISSING = 0.5  # chosen: of an outlier's limit, in the median; careful clicks in three cameras miss by 0.3
 _BETTER, _CLEARER = 1 / 3, 1 / 2  # chosen: of what is missed now, and of what any other change leaves, that is left
-_FACTORS = {2.0: "half as large", 0.5: "twice as large"}  # on pixels, and the images that were clicked
+_FACTORS = {2.0: "half as large", 0.5: "twice as large"}  # chosen: on pixels, and the images that were clicked
 
 
 def explain_misses(rig: Rig, px: Array, weights: Array) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -62,10 +62,10 @@ def find_ambiguity(model: BodyModel, targets: Mapping[str, Array], weights: Mapp
     A body that faces the other way differs in its feet and in how knees and elbows bend. `fit` is as for
     `find_exchange`. About 0.3 s where no foot is given.
     """
-    pairs = {name: other_side(name) for name in targets if other_side(name) in targets and other_side(name) != name}
-    if not (model.has_joints and pairs) or any(without_side(name) == "foot" for name in targets):
+    exchanged = _exchange(targets, _KINDS[""])
+    if not (model.has_joints and exchanged) or any(without_side(name) == "foot" for name in targets):
         return ""
-    other = fit_pose(model, {name: targets[pairs.get(name, name)] for name in targets}, weights=weights)
+    other = fit_pose(model, exchanged, weights=weights)
     if other.rms_m > _AS_WELL * fit.rms_m:
         return ""
     return (
@@ -90,15 +90,19 @@ def find_exchange(
         return None
     tried = {}
     for words, stems in _KINDS.items():
-        others = {name: other_side(name) for name in targets if without_side(name) in stems}
-        pairs = {name: other for name, other in others.items() if other in targets}
-        if pairs:
-            exchanged = {name: targets[pairs.get(name, name)] for name in targets}
+        if exchanged := _exchange(targets, stems):
             tried[words] = _rms_m(model, exchanged, weights)
     best = min(tried, key=tried.__getitem__, default="")
     if not tried or tried[best] >= _EXCHANGED_SHARE * as_named_m:
         return None
     return Exchange(best, as_named_m, tried[best])
+
+
+def _exchange(targets: Mapping[str, Array], stems: Sequence[str]) -> dict[str, Array]:
+    """Return targets with left and right exchanged where a pair of these stems has both; {} where none has."""
+    others = {name: other_side(name) for name in targets if without_side(name) in stems}
+    pairs = {name: other for name, other in others.items() if other in targets}
+    return {name: targets[pairs.get(name, name)] for name in targets} if pairs else {}
 
 
 def _rms_m(model: BodyModel, targets: Mapping[str, Array], weights: Mapping[str, float]) -> float:
