@@ -105,6 +105,12 @@ def test_of_a_table_in_another_form_it_is_said_how_to_save_it(tmp_path, data, sa
         read_csv(tmp_path / "a.csv", "expected a table", ValueError)
 
 
+@pytest.mark.parametrize("text", ["a = 1,74\n", "b = 1\na = [0,033, 0.3]", "a = -0,5"])
+def test_a_decimal_comma_in_toml_is_named(text):
+    with pytest.raises(tomllib.TOMLDecodeError, match="a comma stands for a decimal point"):
+        parse_toml(text)
+
+
 def test_a_cell_may_hold_a_semicolon(tmp_path):
     (tmp_path / "a.csv").write_text("\ufeffpoint,note\na,b;c\n", encoding="utf-8")
     assert read_csv(tmp_path / "a.csv", "", ValueError) == [(1, ["point", "note"]), (2, ["a", "b;c"])]

@@ -139,6 +139,15 @@ def test_what_is_left_of_tables_with_mistakes_is_read_too(folder, capsys):
         assert sum(said in line for line in mistakes) == 1, said
 
 
+@pytest.mark.parametrize("body", ['preset = "human18"\nstature_m = 18.0\nmass_kg = 70.0', ""])
+def test_where_the_body_is_a_mistake_the_rest_is_read(folder, body):
+    path = edit(folder, ('[body]\nfile = "cross.toml"', f"[body]\n{body}"), ("calib_true.toml", "calib.toml"))
+    checks = check_trial(path)
+    assert [line.split(": ")[1] for line in checks.mistakes][0] == "body"
+    assert len(checks.mistakes) == 2 and "calib.toml not found" in checks.mistakes[1]
+    assert not [line for line in checks.well if line.startswith("body")]
+
+
 def test_cameras_with_mistakes_are_left_out_and_the_others_read(folder):
     path = edit(folder, ("frame = 0", "fram = 0"), ('video = "cam2.mp4"\n', ""), ("cam3.mp4", "cam9.mp4"))
     checks = check_trial(path)

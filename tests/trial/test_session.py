@@ -94,9 +94,10 @@ def test_athletes_that_are_no_tables_are_refused(tmp_path):
 
 
 def test_the_rest_of_a_trial_with_mistakes_keeps_its_session(tmp_path):
-    trial = parse_remainder(write(tmp_path, 'labels = { athlete = "anna" }\nwrong = 1'))
-    assert trial is not None
-    assert trial.path("calib.toml").is_file()
+    rest = parse_remainder(write(tmp_path, 'labels = { athlete = "anna" }\nwrong = 1'))
+    assert rest is not None
+    assert rest.has_body
+    assert rest.trial.path("calib.toml").is_file()
 
 
 def test_a_short_label_cannot_make_a_short_session_a_huge_text(tmp_path):

@@ -26,6 +26,7 @@ _LARGEST_YAML_BYTES = 100_000  # likewise: it is parsed slowly
 
 _CONTROLS = re.compile(rb"[\x00-\x08\x0e-\x1f]")  # which no text has, whatever its letters' encoding
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
+_DECIMAL_COMMA = re.compile(r"=\s*[-+]?\d+,\d|\d,0\d")
 _DEEP_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){64}""")  # a.a.a...: takes quadratic time
 
 
@@ -154,8 +155,12 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        end = f"at line {len(text.splitlines())}, the end of the file"
-        raise tomllib.TOMLDecodeError(str(error).replace("at end of document", end)) from None
+        lines = text.splitlines()
+        reason = str(error).replace("at end of document", f"at line {len(lines)}, the end of the file")
+        line = re.search(r"at line (\d+)", reason)
+        if line is not None and 0 < int(line[1]) <= len(lines) and _DECIMAL_COMMA.search(lines[int(line[1]) - 1]):
+            reason += ", where a comma stands for a decimal point"
+        raise tomllib.TOMLDecodeError(reason) from None
     except (RecursionError, ValueError, OverflowError) as error:
         reason = "nested too deep" if isinstance(error, RecursionError) else str(error)[:120]
         raise tomllib.TOMLDecodeError(reason) from None

@@ -28,7 +28,7 @@ from airborne.run.opening import (
 from airborne.run.players_mix_ups import refuse_players_mix_ups
 from airborne.run.players_tracker import doubt_starts, player_starts, players_tracker_of, start_notes
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
-from airborne.trial.remainder import parse_remainder
+from airborne.trial.remainder import Remainder, parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
 from airborne.video.outages import DARK_LEVEL, is_dark
 
@@ -76,19 +76,20 @@ def check_trial(path: Path, report: Callable[[str], None] = lambda line: None) -
     """
     checks = Checks(report)
     trial = checks.attempt(lambda: parse_trial(path), lambda trial: f"{path.name}: {_describe(trial)}")
-    trial = trial or _read_remainder(path)
-    if trial is None:
+    remainder = Remainder(trial, has_body=True) if trial is not None else _read_remainder(path)
+    if remainder is None:
         return checks
+    trial = remainder.trial
     checks.mistakes += [f"{path.name}: {mistake}" for mistake in list_wrong_names(trial)]
     facts = _check_videos(checks, trial)
     checks.attempt(lambda: refuse_same_files(trial), lambda _: "videos: each camera has a file of its own")
-    _check_files(checks, trial, facts)
+    _check_files(checks, remainder, facts)
     if not checks.mistakes:
         _check_start(checks, trial, tuple(facts.values()))
     return checks
 
 
-def _read_remainder(path: Path) -> Trial | None:
+def _read_remainder(path: Path) -> Remainder | None:
     try:
         return parse_remainder(path)
     except TrialError:
@@ -113,8 +114,9 @@ def _check_videos(checks: Checks, trial: Trial) -> dict[str, VideoFacts]:
     return found
 
 
-def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> None:
+def _check_files(checks: Checks, remainder: Remainder, facts: dict[str, VideoFacts]) -> None:
     """Read the calibration, the body and the detections; those that do not exist are listed already."""
+    trial = remainder.trial
     calibration, body, detections = trial.calibration, trial.body, trial.start.detections
     shown = trial.model_copy(update={"camera": [camera for camera in trial.camera if camera.name in facts]})
     if facts and _exists(trial, calibration.file or calibration.control_points):
@@ -123,7 +125,7 @@ def _check_files(checks: Checks, trial: Trial, facts: dict[str, VideoFacts]) -> 
         )
         for warning in cameras[1].warnings if cameras is not None and cameras[1] is not None else ():
             checks.add(f"note: {warning}")
-    if not trial.has_players and _exists(trial, body.source_file):
+    if remainder.has_body and not trial.has_players and _exists(trial, body.source_file):
         model = checks.attempt(
             trial.model,
             lambda model: "; ".join([f"body: {model.name}, {count(len(model.segments), 'segment')}", *model.notes]),

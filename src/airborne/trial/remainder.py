@@ -5,22 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from airborne.errors import MistakesError
 from airborne.trial.file import Trial
 from airborne.trial.session import read_tables
 
 _MOST_MISTAKES = 100  # after which nothing is left
+_ANYBODY = {"preset": "human18", "stature_m": 1.75, "mass_kg": 70.0}  # in place of a body that cannot be read
 
 
-def parse_remainder(path: Path) -> Trial | None:
+class Remainder(NamedTuple):
+    """A trial without its mistakes; `has_body` says whether its body is what the file says."""
+
+    trial: Trial
+    has_body: bool
+
+
+def parse_remainder(path: Path) -> Remainder | None:
     """Read a trial whose tables hold mistakes, without these: keys at their defaults, cameras left out.
 
     None where it cannot be read without them. Raises TrialError for a file without tables.
     """
     tables, folder, _ = deepcopy(read_tables(path))
     for _ in range(_MOST_MISTAKES):
+        has_body = tables.setdefault("body", _ANYBODY) is not _ANYBODY
         try:
             trial = Trial(**tables)
         except MistakesError as error:
@@ -28,7 +37,7 @@ def parse_remainder(path: Path) -> Trial | None:
                 return None
         else:
             trial._folder = folder
-            return trial
+            return Remainder(trial, has_body)
     return None
 
 
