@@ -86,15 +86,19 @@ def test_what_speaks_against_a_run_is_said_beside_its_numbers_and_in_the_same_wo
     motion = jumping.motion_of(jumping.Jumper())
     (jump,) = measure_jumps(motion)
     summary = summary_of([{**jump_row(jump), "noise_scale": 9.0}])
-    doubts = ["ankles and feet in frames 29 to 55: sd over 6 cm"]
+    doubts = ["all joints in frames 0 to 149: sd over 6 cm"]
     few = {"n_below_two_cameras": 90, "n_fewer_cameras": 90, "doubts": doubts}
     summary["players"] = {"one": {**COUNTS, "n_tracked": 0, "n_uncertain": 150, **few}}
     _, uncertain, few, untracked, unseen, _, _, noisy = players_summary(summary)
-    assert uncertain == "  uncertain are ankles and feet in frames 29 to 55: sd over 6 cm; look at them before use"
+    assert uncertain == "  uncertain are all joints in frames 0 to 149: sd over 6 cm; look at them before use"
     assert few == "  90 of 150 frames rest on fewer than two cameras, so that depth is a guess"
     assert untracked.startswith("  no frame was tracked, so none of these numbers can be relied on: are the joints of ")
     assert unseen.startswith("  in most frames fewer than two cameras agree: are videos exchanged")
     assert noisy.startswith("  its flight differs from a fall at 9.81 m/s² 3.0 times as much as stated errors explain")
+    of_some = {**summary["players"]["one"], "doubts": ["ankles in frame 9: sd over 6 cm"]}
+    assert list(players_summary({**summary, "players": {"one": of_some}}))[3] == (
+        "  no frame was tracked, so none of these numbers can be relied on: in each some joint is uncertain, as said above"
+    )
     warnings = list(players_warnings(summary))
     of_player = [f"one: {line.strip()}" for line in (uncertain, few, untracked, unseen)]
     assert warnings == [*of_player, f"one, jump 1: {noisy.strip()}"]
