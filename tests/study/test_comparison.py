@@ -61,6 +61,17 @@ def test_of_a_number_that_is_the_same_in_all_trials_no_interval_is_stated(tmp_pa
     assert "wet minus dry is 0 and could not be tested: too few, or all the same; within 5 athletes" in text
 
 
+def test_an_athlete_in_both_of_two_groups_is_named(tmp_path):
+    labels = [("ann", "dry"), ("bob", "dry"), ("ann", "wet"), ("cid", "wet")]
+    rows = [
+        {"trial": f"{a}_{c}", "athlete": a, "condition": c, "turns": float(k), "turns_sd": 0.1}
+        for k, (a, c) in enumerate(labels)
+    ]
+    compared = compare_trials(read_study(write_results(tmp_path, rows)), "turns", ())
+    text = describe_study([compared], (), real_time=False)
+    assert "between athletes (2 and 2, of whom ann is in both and counts in each), as too few" in text
+
+
 def test_without_repeated_trials_no_spread_of_trials_is_stated(tmp_path):
     assert in_process("compare", season(tmp_path / "in", n=1), "-o", tmp_path, "--variable", "turned_deg") == 0
     (row,) = csv.DictReader((tmp_path / "differences.csv").read_text().splitlines())

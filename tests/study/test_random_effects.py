@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import ttest_ind, ttest_rel
+from scipy.stats import norm, ttest_ind, ttest_rel
 
 from airborne.study.comparison import adjust_holm
 from airborne.study.random_effects import Cells, estimate_difference, pool, within_spread
@@ -69,28 +69,45 @@ def test_nodes_of_a_curve_are_each_for_itself():
 
 
 def test_equal_means_pool_to_themselves_without_spread():
-    mean, variance, between = pool(np.full((4, 1), 3.0), np.full((4, 1), 0.2))
-    np.testing.assert_allclose([mean[0], variance[0], between[0]], [3.0, 0.0, 0.0], atol=EXACT)
+    mean, variance, least, between = pool(np.full((4, 1), 3.0), np.full((4, 1), 0.2))
+    np.testing.assert_allclose([mean[0], variance[0], least[0], between[0]], [3.0, 0.0, 0.05, 0.0], atol=EXACT)
+
+
+def test_athletes_who_are_alike_by_chance_make_no_interval_narrower_than_the_measurement():
+    values = np.array([[1.0], [1.1], [1.0], [1.1]])
+    at = {"athlete": np.array([0, 0, 1, 1]), "condition": np.array([0, 1, 0, 1])}
+    found = estimate_difference(Cells(values=values, variance=np.full((4, 1), 0.05**2), **at), 0, 1)
+    half = 1.96 * 0.05  # of each difference 0.05 sqrt(2), of their mean 0.05
+    np.testing.assert_allclose([found.low[0], found.high[0]], [0.1 - half, 0.1 + half], atol=1e-4)
+    np.testing.assert_allclose(found.p[0], 2 * norm.sf(0.1 / 0.05))
+
+
+def test_differences_that_are_all_the_same_have_no_interval_where_nothing_is_stated():
+    values = np.array([[1.0], [2.0], [3.0], [4.0]])
+    at = {"athlete": np.array([0, 0, 1, 1]), "condition": np.array([0, 1, 0, 1])}
+    found = estimate_difference(Cells(values=values, variance=np.zeros((4, 1)), **at), 0, 1)
+    assert found.value[0] == 1
+    assert np.isnan([found.low[0], found.high[0], found.p[0]]).all()
 
 
 def test_the_variance_between_athletes_is_found():
     rng = np.random.default_rng(5)
     own = rng.uniform(0.5, 1.5, (4000, 1))
     means = 1 + rng.normal(0, np.sqrt(2.0**2 + own))
-    np.testing.assert_allclose(pool(means, own)[2], 4.0, rtol=0.1)
+    np.testing.assert_allclose(pool(means, own).between, 4.0, rtol=0.1)
 
 
-def test_spreads_split_what_the_measurement_explains():
+def test_trials_differ_by_themselves_and_by_the_measurement():
     cells = draw(np.random.default_rng(6), athletes=200, trials=5, sd_trial=1.2, sd_measured=0.5)
     spread = within_spread(cells)
-    np.testing.assert_allclose(spread.sd_trials, 1.2, rtol=0.08)
+    np.testing.assert_allclose(spread.sd_within, 1.3, rtol=0.08)
     np.testing.assert_allclose(spread.mdc, 1.96 * np.sqrt(2) * 1.3, rtol=0.08)
 
 
 def test_without_repeated_trials_the_measurement_alone_is_known():
     spread = within_spread(draw(np.random.default_rng(7), trials=1))
     np.testing.assert_allclose(spread.sd_measurement, 0.5, atol=EXACT)
-    assert np.isnan([spread.sd_within, spread.sd_trials, spread.mdc]).all()
+    assert np.isnan([spread.sd_within, spread.mdc]).all()
 
 
 @pytest.mark.parametrize("options", [{}, {"trials": (2, 7)}, {"athletes": 16, "paired": False}])

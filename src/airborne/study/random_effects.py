@@ -5,16 +5,18 @@ has two stages. In the first, each athlete's mean in each condition gets the var
 pooled variance within athletes and conditions, which holds the measurement's. In the second these means are pooled as
 in a random-effects meta-analysis: the variance between athletes by Paule and Mandel 1982, the interval by Hartung and
 Knapp 2001 ("A refined method for the meta-analysis of controlled clinical trials with binary outcome") with Student's
-t. With as many trials in every cell that is the paired t-test of the athletes' means, exactly.
+t. With as many trials in every cell that is the paired t-test of the athletes' means. Athletes who are alike by chance
+make it narrower than trials and measurement allow: it is no narrower than 1.96 sds of a mean by these alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 from scipy.stats import t as student
 
 from airborne.constants import NORMAL_QUANTILE_975
@@ -70,7 +72,6 @@ class Spread:
     """
 
     sd_within: Array  # of single trials, the measurement included
-    sd_trials: Array  # without it
     sd_measurement: Array  # as the runs state it
     mdc: Array  # minimal (or smallest) detectable change of a single trial: 1.96 sqrt(2) sd_within
 
@@ -80,7 +81,6 @@ def within_spread(cells: Cells) -> Spread:
     within, stated = _pooled_variance(cells), _stated_variance(cells)
     return Spread(
         sd_within=np.sqrt(within),
-        sd_trials=np.sqrt(np.maximum(within - stated, 0)),
         sd_measurement=np.sqrt(stated),
         mdc=NORMAL_QUANTILE_975 * np.sqrt(2 * within),
     )
@@ -114,14 +114,13 @@ def estimate_difference(cells: Cells, a: int, b: int) -> Difference:
     if len(both) >= _FEWEST:
         means = [np.stack([cells.mean(each, condition) for each in both]) for condition in (a, b)]
         shares = 1 / cells.counts(both, a) + 1 / cells.counts(both, b)
-        value, variance, between = pool(means[1] - means[0], shares[:, None] * within)
-        freedom = np.full(value.shape, len(both) - 1.0)
-        return _difference(
-            "within athletes", value, variance, freedom, sd_athletes=np.sqrt(between), samples=(means[0], means[1])
-        )
+        pooled = pool(means[1] - means[0], shares[:, None] * within)
+        freedom = np.full(pooled.mean.shape, len(both) - 1.0)
+        sd_athletes = np.sqrt(pooled.between)
+        return _difference("within athletes", pooled, freedom, sd_athletes=sd_athletes, samples=(means[0], means[1]))
     if len(np.union1d(of_a, of_b)) == 1:
         samples = tuple(cells.values[cells.condition == condition] for condition in (a, b))
-        pooled = [_plain_mean(each) for each in samples]
+        each_pooled = [_plain_mean(each, _stated_variance(cells)) for each in samples]
         level: Level = "between trials"
         between = np.full(cells.values.shape[1], np.nan)
     else:
@@ -130,33 +129,39 @@ def estimate_difference(cells: Cells, a: int, b: int) -> Difference:
             for athletes, condition in ((of_a, a), (of_b, b))
         )
         counts = (cells.counts(of_a, a), cells.counts(of_b, b))
-        pooled = [pool(each, within / n[:, None]) for each, n in zip(samples, counts, strict=True)]
+        each_pooled = [pool(each, within / n[:, None]) for each, n in zip(samples, counts, strict=True)]
         level = "between athletes"
-        between = np.sqrt((pooled[0][2] + pooled[1][2]) / 2)
-    variance = pooled[0][1] + pooled[1][1]
+        between = np.sqrt((each_pooled[0].between + each_pooled[1].between) / 2)
+    of_a, of_b = each_pooled
+    pooled = PooledMean(of_b.mean - of_a.mean, of_a.variance + of_b.variance, of_a.least + of_b.least, between)
     with np.errstate(divide="ignore", invalid="ignore"):  # Welch and Satterthwaite
-        freedom = variance**2 / sum(
-            each[1] ** 2 / (len(sample) - 1) for each, sample in zip(pooled, samples, strict=True)
+        freedom = pooled.variance**2 / sum(
+            each.variance**2 / (len(sample) - 1) for each, sample in zip(each_pooled, samples, strict=True)
         )
-    return _difference(
-        level, pooled[1][0] - pooled[0][0], variance, freedom, sd_athletes=between, samples=(samples[0], samples[1])
-    )
+    return _difference(level, pooled, freedom, sd_athletes=between, samples=(samples[0], samples[1]))
 
 
-def pool(means: Array, variances: Array) -> tuple[Array, Array, Array]:
-    """Pool athletes' means (n, nodes) of known variances: return the mean, its variance, and that between athletes.
+class PooledMean(NamedTuple):
+    """A mean of athletes, or of trials, or the difference of two (nodes,)."""
 
-    Each (nodes,), the mean's variance after Hartung and Knapp; the variances are NaN for fewer than two athletes.
-    """
+    mean: Array
+    variance: Array  # by how much they differ; NaN for fewer than two
+    least: Array  # variance that it has by the variances of each alone
+    between: Array  # variance between athletes; NaN for fewer than two
+
+
+def pool(means: Array, variances: Array) -> PooledMean:
+    """Pool athletes' means (n, nodes) of known variances, their mean's variance after Hartung and Knapp."""
     n = len(means)
     if n < _FEWEST:
         unknown = np.full(means.shape[1], np.nan)
-        return means.mean(axis=0), unknown, unknown
+        return PooledMean(means.mean(axis=0), unknown, variances.sum(axis=0), unknown)
     between = _between(means, variances)
     weights = _weights(between, variances)
-    mean = np.sum(weights * means, axis=0) / np.sum(weights, axis=0)
-    spread = np.sum(weights * (means - mean) ** 2, axis=0) / ((n - 1) * np.sum(weights, axis=0))
-    return mean, spread, between
+    total = np.sum(weights, axis=0)
+    mean = np.sum(weights * means, axis=0) / total
+    spread = np.sum(weights * (means - mean) ** 2, axis=0) / ((n - 1) * total)
+    return PooledMean(mean, spread, np.where(variances.any(axis=0), 1 / total, 0.0), between)
 
 
 def _between(means: Array, variances: Array) -> Array:
@@ -183,20 +188,23 @@ def _weights(between: Array, variances: Array) -> Array:
     return 1 / np.maximum(between + variances, _LEAST)
 
 
-def _plain_mean(values: Array) -> tuple[Array, Array]:
-    """Return the mean of trials (n, nodes) and its variance; NaN for one."""
+def _plain_mean(values: Array, stated_variance: Array) -> PooledMean:
+    """Return the mean of trials (n, nodes); its variance is NaN for one."""
     n = len(values)
-    variance = np.var(values, axis=0, ddof=1) / n if n > 1 else np.full(values.shape[1], np.nan)
-    return values.mean(axis=0), variance
+    unknown = np.full(values.shape[1], np.nan)
+    variance = np.var(values, axis=0, ddof=1) / n if n > 1 else unknown
+    return PooledMean(values.mean(axis=0), variance, stated_variance / n, unknown)
 
 
 def _difference(
-    level: Level, value: Array, variance: Array, freedom: Array, *, sd_athletes: Array, samples: tuple[Array, Array]
+    level: Level, pooled: PooledMean, freedom: Array, *, sd_athletes: Array, samples: tuple[Array, Array]
 ) -> Difference:
-    sd = np.sqrt(variance)
-    half = student.ppf(0.975, freedom) * sd
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p = 2 * student.sf(np.abs(value) / sd, freedom)
+    """Return a difference with its interval; without one where nothing tells how much trials differ."""
+    value = pooled.mean
+    sd = np.sqrt(np.where(pooled.variance > 0, pooled.variance, np.nan))
+    least = np.sqrt(np.where((pooled.least > 0) & np.isfinite(pooled.variance), pooled.least, np.nan))
+    half = np.fmax(student.ppf(0.975, freedom) * sd, NORMAL_QUANTILE_975 * least)
+    p = 2 * np.fmax(student.sf(np.abs(value) / sd, freedom), norm.sf(np.abs(value) / least))
     return Difference(
         level=level, value=value, low=value - half, high=value + half, p=p, sd_athletes=sd_athletes, samples=samples
     )

@@ -71,7 +71,8 @@ def describe_study(
         )
     text.append(
         "Differences of conditions were pooled over athletes with random effects: the variance between athletes by "
-        "Paule and Mandel (1982), 95 % intervals by Hartung and Knapp (2001) with Student's t."
+        "Paule and Mandel (1982), 95 % intervals by Hartung and Knapp (2001) with Student's t, no narrower than trials "
+        "and measurement alone make them."
     )
     if "between trials" in levels:
         text.append("With a single athlete, the interval is Welch's, of trials, and holds for that athlete only.")
@@ -161,4 +162,8 @@ def _describe_level(contrast: Contrast, comparison: VariableComparison) -> str:
     a, b = contrast.difference.samples
     level = contrast.difference.level
     n = count(len(a), "athlete") if level == "within athletes" else f"{len(a)} and {len(b)}"
+    if level == "between athletes":
+        in_each = [comparison.cells.athletes_in(comparison.conditions.index(name)) for name in (contrast.a, contrast.b)]
+        for athlete in np.intersect1d(*in_each).tolist():
+            n += f", of whom {comparison.athletes[athlete]} is in both and counts in each"
     return _LEVELS[level].format(n)

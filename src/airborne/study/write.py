@@ -115,7 +115,7 @@ def _differences(comparison: VariableComparison) -> Iterator[dict[str, Any]]:
             "p": np.nan if each.p_holm is None else float(difference.p[k]),
             "p_holm": np.nan if each.p_holm is None else each.p_holm,
             "sd_athletes": float(difference.sd_athletes[k]),
-            "sd_trials": float(spread.sd_trials[k]),
+            "sd_trials": float(spread.sd_within[k]),
             "sd_measurement": float(spread.sd_measurement[k]) or np.nan,  # 0: not stated
             "mdc": float(spread.mdc[k]),
         }
