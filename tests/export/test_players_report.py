@@ -97,7 +97,8 @@ def test_what_speaks_against_a_run_is_said_beside_its_numbers_and_in_the_same_wo
     assert noisy.startswith("  its flight differs from a fall at 9.81 m/s² 3.0 times as much as stated errors explain")
     of_some = {**summary["players"]["one"], "doubts": ["ankles in frame 9: sd over 6 cm"]}
     assert list(players_summary({**summary, "players": {"one": of_some}}))[3] == (
-        "  no frame was tracked, so none of these numbers can be relied on: in each some joint is uncertain, as said above"
+        "  no frame was tracked, so none of these numbers can be relied on: in each some joint is uncertain, as said "
+        "above"
     )
     warnings = list(players_warnings(summary))
     of_player = [f"one: {line.strip()}" for line in (uncertain, few, untracked, unseen)]

@@ -7,7 +7,7 @@ import pytest
 
 from airborne.cameras import Rig
 from airborne.motion import Motion
-from airborne.run.self_check import check_run, looks_unlike
+from airborne.run.self_check import check_run, look_unlike
 from airborne.tracking import Status
 from airborne.tracking.first_pose import FirstPose
 from airborne.tracking.first_pose.body_size import WrongSize
@@ -25,10 +25,11 @@ def checked():
         kept.add(scene.frames(index))
     run = Motion.collect(track(scene, indices))
 
-    def check(n_doubtful=0, **said):
+    def check(n_doubtful=0, *, score=run.score, n_views=run.n_views, **said):
         status = np.where(np.arange(len(run)) < len(run) - n_doubtful, run.status, Status.UNCERTAIN.value)
         first = FirstPose(run.pose(0), **said)
-        return check_run(replace(run, status=status), CROSS, Rig(scene.cameras), kept, is_preset=False, first=first)
+        seen = replace(run, status=status, score=score, n_views=n_views)
+        return check_run(seen, CROSS, Rig(scene.cameras), kept, is_preset=False, first=first)
 
     return check
 
@@ -59,8 +60,14 @@ def test_a_start_that_may_face_the_other_way_is_believed_until_tracking_doubts_f
     assert any("left and right may be exchanged" in each for each in found.doubts) is not is_believed
 
 
-def test_first_frames_that_look_unlike_the_later_ones_are_told_and_single_later_ones_are_not():
-    scores = np.array([5.0, 12.0, 11.0, 5.0, 5.1, 12.0, 4.9, 5.2])
-    assert np.flatnonzero(looks_unlike(scores, first=1)).tolist() == [1, 2]
-    assert not looks_unlike(scores, first=3).any()
-    assert not looks_unlike(np.full(3, np.nan), first=0).any()
+def test_first_frames_that_look_unlike_later_ones_and_such_of_fewer_cameras_are_uncertain(
+    checked,
+):
+    scores = np.array([12.0, 11.0, *[5.0] * 5, 12.0, 12.0, *[5.0] * 3])
+    found = checked(score=scores, n_views=np.r_[[3] * 8, 1, [3] * 3])
+    assert np.flatnonzero(found.motion.status != Status.TRACKED.value).tolist() == [0, 1, 8]
+    assert any("fewer cameras see the body there" in each for each in found.doubts)
+
+
+def test_of_scores_that_are_not_known_nothing_is_said():
+    assert not look_unlike(np.full(3, np.nan)).any()

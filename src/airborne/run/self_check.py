@@ -25,6 +25,7 @@ from airborne.tracking.self_check.nuisances import MEASURED_SD, ONE_CAMERA_SD, P
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.tracking.self_check.reach import FarReach, doubtful_joints, find_far_reach
 from airborne.tracking.self_check.roughness import PathFinding, find_wrong_path, measure_roughness
+from airborne.tracking.self_check.strays import find_strays
 from airborne.types import Array
 
 # of the sizes of body and world, chosen: at a rate 10 % too low those of a throw were 23.2 and 23.4 %
@@ -33,10 +34,16 @@ _CLEARLY_ROUGH = 1.5  # chosen: a factor on standard deviations from which on it
 # of the frames, by tracking alone. Chosen between the starts by 12 points of one recorded person: the right ones left 3
 # of 32 frames in doubt, with left and right exchanged they left 14
 _DOUBTFUL_SHARE = 0.25
-# times the run's median score, of first frames. Chosen: 40 runs of a thing, right ones and with mistakes of all kinds,
-# began with 0.8 to 1.24; one that began turned by half, and found itself in the third frame, with 2.5
+# times the run's median score, of first frames or of frames that fewer cameras show. Chosen: 40 runs of a thing, right
+# ones and with mistakes of all kinds, began with 0.8 to 1.24; one that began turned by half, and found itself in the
+# third frame, with 2.5; one that a camera alone showed, 0.6 m off, had 2
 _UNLIKE_SHARE = 1.6
 _UNLIKE = "at its start the body looks less like the pictures than later: is the start turned, or of another frame?"
+_UNLIKE_IN_FEWER = "fewer cameras see the body there than elsewhere, and it looks less like their pictures"
+_STRAY = (
+    "the body leaves the path of the frames around, and looks less like the pictures than in these: are pictures "
+    "repeated or lost, or a camera late for a while?"
+)
 _EITHER_WAY = (
     "left and right may be exchanged in the start's points, which fit as well the other way; add the toes' tips"
 )
@@ -118,7 +125,12 @@ def check_run(
     far = None if run is None or not model.has_joints else find_far_reach(model, run.reach)
     wrong += [] if far is None else [far]
     if not model.has_joints:
-        reasons[_UNLIKE] = looks_unlike(motion.score[rows], first=int(np.argmin(np.abs(path.index - begun.index))))
+        scores, n_views = motion.score[rows], motion.n_views[rows]
+        is_unlike = look_unlike(scores)
+        first = int(np.argmin(np.abs(path.index - begun.index)))
+        reasons[_UNLIKE] = np.append(np.zeros(first, bool), np.logical_and.accumulate(is_unlike[first:]))
+        reasons[_UNLIKE_IN_FEWER] = is_unlike & (n_views < n_views.max())
+        reasons[_STRAY] = find_strays(path, scores)
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
         of_flight = find_wrong_flight(*flight)
         wrong += [each for each in (of_path, of_flight) if each is not None]
@@ -156,13 +168,10 @@ def check_run(
     return CheckedRun(checked, found, tuple(sentences), wrong, is_start_wrong, doubtful)
 
 
-def looks_unlike(scores: Array, first: int) -> NDArray[np.bool_]:
-    """Tell which frames from the first tracked one on look unlike the pictures, by scores (n,) of a whole run: (n,)."""
-    is_unlike = np.zeros(len(scores), bool)
-    if np.isfinite(scores).any():
-        of_later = scores[first:] > _UNLIKE_SHARE * np.nanmedian(scores)
-        is_unlike[first:] = np.logical_and.accumulate(of_later)
-    return is_unlike
+def look_unlike(scores: Array) -> NDArray[np.bool_]:
+    """Tell which frames look unlike the pictures, by scores (n,) of a whole run: (n,)."""
+    is_known = np.isfinite(scores)
+    return is_known & (scores > _UNLIKE_SHARE * np.median(scores[is_known] if is_known.any() else 0.0))
 
 
 def widen_by_fall(motion: Motion, fall: WrongFall) -> Motion:

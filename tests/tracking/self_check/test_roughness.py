@@ -2,45 +2,28 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body import Pose
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.tracking.self_check.roughness import find_wrong_path, measure_roughness
-
-POSITION_SD_M, ROTATION_SD_RAD = 0.002, 0.004
-N, RATE_HZ = 60, 50.0
-
-
-def path(position=1.0, rotation=1.0, *, seed=0, every=1, is_known=True):
-    """A thrown body that turns twice a second, with errors of these factors on the stated ones."""
-    rng, index = np.random.default_rng(seed), np.arange(0, N * every, every)
-    t = index / RATE_HZ / every
-    places = np.stack([2 * t, 0.3 * t, 1 + 4 * t - 9.81 / 2 * t**2], axis=1)
-    places += position * POSITION_SD_M * rng.standard_normal((N, 3))
-    turned = Rotation.from_rotvec(np.outer(4 * np.pi * t, [0.6, 0.0, 0.8]))
-    turned = Rotation.from_rotvec(rotation * ROTATION_SD_RAD * rng.standard_normal((N, 3))) * turned
-    poses = [Pose(world_from_root=RigidTransform.from_components(p, r)) for p, r in zip(places, turned, strict=True)]
-    variance = np.repeat([POSITION_SD_M, ROTATION_SD_RAD], 3) ** 2
-    covariance = np.tile(np.diag(variance if is_known else np.full(6, np.inf)), (N, 1, 1))
-    return TrackedPath(index, t, poses, covariance)
-
+from tests.support.thrown_paths import POSITION_SD_M, N, thrown_path
 
 EVERY = np.ones(N, bool)
 
 
 @pytest.mark.parametrize(("position", "rotation"), [(1, 1), (3, 1), (1, 5), (8, 8)])
 def test_the_factor_is_that_of_the_errors(position, rotation):
-    found = np.mean([measure_roughness(path(position, rotation, seed=seed), EVERY) for seed in range(10)], axis=0)
+    found = np.mean(
+        [measure_roughness(thrown_path(position, rotation, seed=seed), EVERY) for seed in range(10)], axis=0
+    )
     assert found == pytest.approx([position, rotation], rel=0.25)
 
 
 def test_a_path_that_is_smoother_than_stated_leaves_the_errors_as_they_are():
-    assert measure_roughness(path(0.0, 0.2), EVERY).tolist() == [1, 1]
+    assert measure_roughness(thrown_path(0.0, 0.2), EVERY).tolist() == [1, 1]
 
 
 def test_errors_that_alternate_between_fields_are_seen():
-    smooth = path(0.0, 0.0)
+    smooth = thrown_path(0.0, 0.0)
     shift_m, none = 5 * POSITION_SD_M * np.array([0.0, 0.0, 1.0]), np.zeros(3)
     poses = [pose.move(shift_m * (i % 2), none) for i, pose in enumerate(smooth.poses)]
     position, rotation = measure_roughness(TrackedPath(smooth.index, smooth.time_s, poses, smooth.covariance), EVERY)
@@ -49,7 +32,7 @@ def test_errors_that_alternate_between_fields_are_seen():
 
 @pytest.mark.parametrize("given", ["gaps", "untracked", "unknown", "few"])
 def test_where_nothing_can_be_compared_nothing_is_multiplied(given):
-    rough = path(5.0, 5.0, every=2 if given == "gaps" else 1, is_known=given != "unknown")
+    rough = thrown_path(5.0, 5.0, every=2 if given == "gaps" else 1, is_known=given != "unknown")
     tracked = EVERY if given != "untracked" else np.arange(N) % 4 > 0
     if given == "few":
         rough = TrackedPath(rough.index[:6], rough.time_s[:6], rough.poses[:6], rough.covariance[:6])
@@ -65,13 +48,13 @@ def repeated(every, smooth):
 
 @pytest.mark.parametrize(("every", "share"), [(2, 0.5), (5, 0.2)])
 def test_repeated_pictures_are_named_with_their_share(every, share):
-    found = find_wrong_path(repeated(every, path(0.1, 0.1)), np.ones(2))
+    found = find_wrong_path(repeated(every, thrown_path(0.1, 0.1)), np.ones(2))
     assert found is not None and found.kind == "repeated" and found.to_dict()["is_alarm"]
     assert found.value == pytest.approx(share, abs=0.03)
 
 
 def test_a_thing_that_rests_or_bounces_repeats_nothing():
-    smooth = path(0.1, 0.1)
+    smooth = thrown_path(0.1, 0.1)
     times, covariance = (smooth.index, smooth.time_s), smooth.covariance
     rests = TrackedPath(*times, [smooth.poses[max(i - 30, 0)] for i in range(N)], covariance)
     bounces = TrackedPath(*times, [smooth.poses[abs(i - 30)] for i in range(N)], covariance)
@@ -80,6 +63,6 @@ def test_a_thing_that_rests_or_bounces_repeats_nothing():
 
 
 def test_a_far_too_rough_path_is_an_alarm():
-    found = find_wrong_path(path(0.1, 0.1), np.array([2.0, 6.0]))
+    found = find_wrong_path(thrown_path(0.1, 0.1), np.array([2.0, 6.0]))
     assert found is not None and "rotations 6.0 times" in found.sentence
-    assert find_wrong_path(path(0.1, 0.1), np.array([3.3, 1.0])) is None
+    assert find_wrong_path(thrown_path(0.1, 0.1), np.array([3.3, 1.0])) is None
