@@ -94,7 +94,7 @@ def test_curves_are_drawn(tmp_path, monkeypatch, what):
 
 def test_the_text_of_a_run_says_how_far_it_is(tmp_path, monkeypatch):
     run = run_of(tmp_path, monkeypatch, box_run(n=5), BOX)
-    assert repr(run).endswith("not finished, 5 frames")
+    assert "not finished, 5 frames; standard deviations without" in repr(run)
     with pytest.raises(ResultError, match=r"its run has not finished; go on with resume=True"):
         _ = run.summary
     counts = {"n_frames": 5, "n_tracked": 4, "n_uncertain": 1, "n_lost": 0}

@@ -109,7 +109,7 @@ def test_what_cannot_be_done_is_refused_in_one_line(run, tmp_path, capsys):
     assert "give one way to smooth" in refusal(capsys, "smooth", run, "--kalman", "--spline")
     assert "below 25 Hz" in refusal(capsys, "smooth", run, "--butterworth", "25")
     assert "--butterworth is 'six'" in refusal(capsys, "smooth", run, "--butterworth", "six")
-    assert "from 0.000 to 0.780 s" in refusal(capsys, "smooth", run, "--spline", "--events", "0.2,7")
+    assert "ends, 0.000 and 0.780 s" in refusal(capsys, "smooth", run, "--spline", "--events", "0.2,7")
     assert "--events is 'x'" in refusal(capsys, "smooth", run, "--spline", "--events", "x")
     assert "0 to 0.5 s" in refusal(capsys, "smooth", run, "--spline", "--fill", "2")
     assert "holds no run" in refusal(capsys, "smooth", tmp_path, "--spline")

@@ -29,7 +29,7 @@ def smooth_command(
         str,
         typer.Option(help="Times in s that no filter crosses, as 0.31,0.92; or auto: take-offs and landings; or none."),
     ] = "auto",
-    resample: Annotated[float | None, typer.Option(help="Rate in Hz of the filter where sampling is uneven.")] = None,
+    resample: Annotated[float | None, typer.Option(help="Rate in Hz of the Butterworth filter where sampling is uneven.")] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the results; else the run's.")
     ] = None,
@@ -42,6 +42,7 @@ def smooth_command(
     Example: airborne smooth results
     """
     from airborne.export.summary import json_ready
+    from airborne.motion.run_folder import note_if_unfinished
     from airborne.run.smooth import smooth_run
 
     note = ""
@@ -52,6 +53,8 @@ def smooth_command(
         done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)
     if note:
         errors.print(note, markup=False)
+    if (unfinished := note_if_unfinished(results)) is not None:
+        errors.print(f"note: {unfinished}", markup=False)
     print(json.dumps(json_ready(done.to_dict())) if as_json else done.describe())
 
 

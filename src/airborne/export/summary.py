@@ -43,7 +43,7 @@ def headline(motion: Motion) -> dict[str, Any]:
     - `range_m`: largest minus smallest x, y, z; `tilt_range_deg`: smallest and largest
     - `somersault_rev`, `twist_rev`: revolutions from the first to the last frame with a pose whose angles have an sd;
       of any poses where fewer than two have; `somersault_rev_sd`, `twist_rev_sd`: of both ends together
-    - `turns_s`: the times of these ends
+    - `turns_s`: the times of these ends; a single pose has no turns
     - `n_position_unobservable`, `n_rotation_unobservable`: frames with an infinite variance
     - `n_near_singular`: frames within 5 degrees of 90 degrees of tilt
     - `has_gap`: lost frames lie between frames with a pose, so that whole revolutions may be miscounted
@@ -69,7 +69,7 @@ def headline(motion: Motion) -> dict[str, Any]:
         "median_position_sd_mm": 1e3 * _median(_rms_over_axes(position_sd)),
         "median_rotation_sd_deg": math.degrees(_median(_rms_over_axes(rotation_sd))),
         "range_m": np.ptp(motion.position[has_pose], axis=0).tolist() if len(rows) else [math.nan] * 3,
-        "turns_s": motion.time_s[has_pose][ends_of_turns].tolist() if len(rows) else [math.nan] * 2,
+        "turns_s": motion.time_s[has_pose][ends_of_turns].tolist() or [math.nan] * 2,
         "somersault_rev": _revolutions(somersault[ends_of_turns]),
         "somersault_rev_sd": _of_both_ends(somersault_sd[ends_of_turns]),
         "tilt_range_deg": [float(tilt.min()), float(tilt.max())] if len(rows) else [math.nan] * 2,
@@ -201,10 +201,10 @@ def _median(values: Array) -> float:
 
 
 def _known_ends(*sd_deg: Array) -> list[int]:
-    """Return the first and last place at which all these are known; of all places where fewer than two are."""
+    """Return the first and last place at which all these are known; of all where fewer than two are, none of one."""
     known = np.flatnonzero(np.isfinite(sd_deg).all(axis=0))
     places = known if len(known) > 1 else np.arange(len(sd_deg[0]))
-    return places[[0, -1]].tolist() if len(places) else []
+    return places[[0, -1]].tolist() if len(places) > 1 else []
 
 
 def _of_both_ends(sd_deg: Array) -> float:

@@ -74,9 +74,10 @@ def note_if_unfinished(folder: Path) -> str | None:
     """Say that the run in a folder is not finished; None where it is."""
     if (folder / SUMMARY).is_file():
         return None
+    unchecked = "their standard deviations leave out what the self-check adds in the end"
     if find_writer(folder) is not None:
-        return "the run goes on: these are the frames so far"
-    return "the run is not finished: these are the frames so far; `airborne track --resume` goes on"
+        return f"the run goes on: these are the frames so far; {unchecked}"
+    return f"the run is not finished: these are the frames so far, `airborne track --resume` goes on; {unchecked}"
 
 
 def read_body_run(folder: Path) -> tuple[Motion, BodyModel]:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from airborne.body import BodyModel
 from airborne.cameras import Rig, read_rig
-from airborne.errors import AirborneError, ResultError, require_choice
+from airborne.errors import AirborneError, ResultError, count, require_choice
 from airborne.export.figures import flight_figure, joint_status_figure, joints_figure, pose_figure
 from airborne.export.players_report import heights_figure
 from airborne.motion import Motion, PlayersMotion, measure_jumps, state_flight
@@ -51,7 +51,8 @@ class Run:
 
     def _state(self) -> str:
         if not (self.folder / "summary.json").is_file():
-            return f"not finished, {len(self.players if self.has_players else self.motion)} frames"
+            n = len(self.players if self.has_players else self.motion)
+            return f"not finished, {count(n, 'frame')}; standard deviations without what the self-check adds"
         summary = self.summary
         counts = ", ".join(f"{summary[f'n_{status}']} {status}" for status in ("tracked", "uncertain", "lost"))
         return f"{summary['name']}, {summary['n_frames']} frames: {counts}"

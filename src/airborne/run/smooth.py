@@ -207,7 +207,8 @@ def _events(run: _Run, times_s: Sequence[float] | None) -> Events:
         outside = [time for time in times_s if not run.time_s[0] < time < run.time_s[-1]]
         if outside:
             raise ResultError(
-                f"no event can be at {outside[0]:g} s: the run goes from {run.time_s[0]:.3f} to {run.time_s[-1]:.3f} s"
+                f"no event can be at {outside[0]:g} s: events lie between the run's ends, {run.time_s[0]:.3f} and "
+                f"{run.time_s[-1]:.3f} s, and are separated by commas, as 0.31,0.92"
             )
         given = tuple(Event("given", time) for time in sorted(set(times_s)))
         return dict.fromkeys(run.owners, given)

@@ -45,7 +45,9 @@ class Smoothing:
                 "the motion in between is unknown"
             )
         if self.method != "butterworth" and not (self.cutoff_hz is self.resample_hz is None):
-            raise ResultError(f"cut-off and resampling are a Butterworth filter's; leave them out of {self.method}")
+            raise ResultError(
+                f"cut-off and resampling are a Butterworth filter's (--butterworth); leave them out of {self.method}"
+            )
 
     def smoother(self, *, has_joints: bool) -> Smoother:
         """Return the smoother of one stretch, of a body with joints or without: errors of one with joints are slow.
