@@ -157,6 +157,10 @@ def test_the_study_holds_no_outputs():
     ("mistake", "said"),
     [
         (lambda: ab.synthesise("banana", "p"), "scene 'banana' is not known; choose cross or somersault or block"),
+        (
+            lambda: ab.synthesise("block", "p", difficulty="cruel"),
+            "difficulty 'cruel' is not known; choose easy or default",
+        ),
         (lambda: ab.synthesise("cross", "p", sed=3), "synthesise has no option sed; it has: preset"),
         (lambda: ab.smooth("results", "butterwort"), "choose butterworth or spline or kalman"),
         (lambda: ab.smooth("results", "butterworth", cutoff_hz="auto"), "cutoff_hz is 'auto'; expected Hz, or None"),

@@ -109,7 +109,10 @@ def test_a_truth_of_players_in_millimetres_is_asked_about(tmp_path, capsys):
     assert in_process("evaluate", run, truth) == 0
     said = capsys.readouterr()
     assert "are its numbers millimetres that are read as metres?" in said.out
-    assert said.err == "airborne: doubt: what was found against the truth is doubtful: see the question at the end of its lines above\n"
+    assert (
+        said.err
+        == "airborne: doubt: what was found against the truth is doubtful: see the question below its numbers\n"
+    )
     assert "Doubtful: " in (run / "agreement_methods.txt").read_text()
     assert json.loads((run / "summary.json").read_text())["truth"]["questions"]
 

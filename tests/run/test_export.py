@@ -32,8 +32,8 @@ from tests.support.takes import tumbling
 from tests.support.tolerances import EXACT
 
 UNFINISHED = (
-    "the run is not finished: these are the frames so far, `airborne track --resume` goes on; their standard deviations "
-    "leave out what the self-check adds in the end"
+    "the run is not finished: these are the frames so far, `airborne track --resume` goes on; their standard "
+    "deviations leave out what the self-check adds in the end"
 )
 MARKED = "status in .csv, sd as residual in .c3d, unmarked in .trc, .mot, .bvh and .glb"
 UNCERTAIN = f"number_7: 18 of 72 points are uncertain: {MARKED}"

@@ -389,5 +389,5 @@ def test_names_paths_and_ranges_that_cannot_be_are_refused_where_declared(thrown
 
 
 def test_a_camera_is_named_once(thrown_cross):
-    with pytest.raises(TrialError, match="--cameras names cam1 twice; name each camera once"):
+    with pytest.raises(TrialError, match="cameras names cam1 twice; name each camera once"):
         read_trial(thrown_cross / "trial.toml", cameras=["cam1", "cam2", "cam1"])

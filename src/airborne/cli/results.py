@@ -94,5 +94,5 @@ def evaluate_command(
     if agreement is not None and agreement.doubts:
         errors.print("airborne: doubt: less than half of a run is tracked: see there", style="yellow", markup=False)
     if doubtful := [_AGAINST[name] for name, comparison in comparisons.items() if comparison.questions]:
-        said = f"what was found {' and '.join(doubtful)} is doubtful: see the question at the end of its lines above"
+        said = f"what was found {' and '.join(doubtful)} is doubtful: see the question below its numbers"
         errors.print(f"airborne: doubt: {said}", style="yellow", markup=False)

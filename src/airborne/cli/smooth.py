@@ -29,7 +29,9 @@ def smooth_command(
         str,
         typer.Option(help="Times in s that no filter crosses, as 0.31,0.92; or auto: take-offs and landings; or none."),
     ] = "auto",
-    resample: Annotated[float | None, typer.Option(help="Rate in Hz of the Butterworth filter where sampling is uneven.")] = None,
+    resample: Annotated[
+        float | None, typer.Option(help="Rate in Hz for --butterworth where sampling is uneven.")
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the results; else the run's.")
     ] = None,

@@ -67,12 +67,9 @@ def synth_block_command(
 
     Example: airborne synth block -o my-block --seed 3 --blockers 2
     """
-    from dataclasses import replace
+    from airborne.synthetic import block_scene, write_block
 
-    from airborne.synthetic import DIFFICULTIES, block_scene, write_block
-
-    options = {"frame_rate": frame_rate, "n_cameras": cameras}
-    hardness = replace(DIFFICULTIES[difficulty], **{key: value for key, value in options.items() if value is not None})
+    options = {"difficulty": difficulty, "frame_rate": frame_rate, "n_cameras": cameras}
     with progress("rendering") as report:
-        write_block(output, block_scene(seed, n_blockers=blockers, difficulty=hardness), progress=report)
+        write_block(output, block_scene(seed, n_blockers=blockers, **options), progress=report)
     print(f"trial: {output / 'trial.toml'}")

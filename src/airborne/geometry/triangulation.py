@@ -54,7 +54,7 @@ def triangulate_linear(P: Array, px: Array) -> Array:
     px = np.asarray(px, float)
     rows = px[..., None] * P[..., 2:, :] - P[..., :2, :]  # (..., c, 2, 4)
     rows = np.where(_is_seen(px)[..., None, None], rows, 0.0)
-    rows = rows.reshape(*rows.shape[:-3], -1, 4)
+    rows = rows.reshape(*rows.shape[:-3], 2 * rows.shape[-3], 4)
     if rows.shape[-2] < 4:
         return np.full((*rows.shape[:-2], 3), np.nan)
     homogeneous = np.linalg.svd(rows, full_matrices=False)[2][..., -1, :]

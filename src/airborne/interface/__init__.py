@@ -12,6 +12,8 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from airborne.calibration import (
     Calibration,
     RigCalibration,
@@ -61,7 +63,8 @@ def read_trial(path: FilePath, *, cameras: Sequence[str] | None = None, **track:
     >>> trial.track.stop
     3
     """
-    return read_trial_file(to_path(path), track, cameras)
+    settings = {name: value.item() if isinstance(value, np.generic) else value for name, value in track.items()}
+    return read_trial_file(to_path(path), settings, cameras)
 
 
 @explain_paths
@@ -132,10 +135,11 @@ def calibrate(
     if sizes is None:
         raise AirborneError("sizes is missing: give the image size in pixels, such as sizes=(768, 576)")
     table = read_control_points(to_path(sources))
-    by_camera = sizes if isinstance(sizes, Mapping) else dict.fromkeys(table.cameras, sizes)
-    for size in by_camera.values():
+    given = sizes if isinstance(sizes, Mapping) else dict.fromkeys(table.cameras, sizes)
+    for size in given.values():
         if not (isinstance(size, Sequence) and len(size) == 2 and all(isinstance(number, Integral) for number in size)):
             raise AirborneError(f"sizes holds {size!r}; expected (width, height) in pixels, such as (768, 576)")
+    by_camera = {name: (int(width), int(height)) for name, (width, height) in given.items()}
     missing = [name for name in table.cameras if name not in by_camera]
     if missing:
         raise AirborneError(f"sizes gives no size for {', '.join(missing)}; add (width, height) in pixels")

@@ -15,6 +15,7 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import AirborneError, ResultError, count, require_choice
 from airborne.export.figures import flight_figure, joint_status_figure, joints_figure, pose_figure
 from airborne.export.players_report import heights_figure
+from airborne.io.names import to_path
 from airborne.motion import Motion, PlayersMotion, measure_jumps, state_flight
 from airborne.motion.labelled import label_angles, label_joints, label_jumps, label_players, label_root
 from airborne.motion.run_folder import holds_players, holds_run, read_body_run, read_players_run, read_summary
@@ -38,6 +39,7 @@ class Run:
     folder: Path
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", to_path(self.folder))
         if not holds_run(self.folder):
             raise ResultError(f"{self.folder} holds no run; expected the output folder of a run")
 
@@ -76,7 +78,7 @@ class Run:
     def players(self) -> PlayersMotion:
         """The players' motion, with the covariance of each joint: arrays in metres."""
         if not self.has_players:
-            raise ResultError(f"{self.folder} holds a run of one body, not of players; use .motion and .flight")
+            raise ResultError(f"{self.folder} holds a run of one body, not of players; use .motion")
         return read_players_run(self.folder)
 
     @property

@@ -163,7 +163,7 @@ def _describe_level(contrast: Contrast, comparison: VariableComparison) -> str:
     level = contrast.difference.level
     n = count(len(a), "athlete") if level == "within athletes" else f"{len(a)} and {len(b)}"
     if level == "between athletes":
-        in_each = [comparison.cells.athletes_in(comparison.conditions.index(name)) for name in (contrast.a, contrast.b)]
-        for athlete in np.intersect1d(*in_each).tolist():
+        in_a, in_b = (comparison.cells.athletes_in(comparison.conditions.index(k)) for k in (contrast.a, contrast.b))
+        for athlete in np.intersect1d(in_a, in_b).tolist():
             n += f", of whom {comparison.athletes[athlete]} is in both and counts in each"
     return _LEVELS[level].format(n)

@@ -12,6 +12,7 @@ _FOLDERS = (_PACKAGE / "example_trials", _PACKAGE.parents[1] / "examples")
 
 def example_trial(name: str) -> Path:
     """Return the trial file of a bundled example; raises TrialError for another name, or where it was not installed."""
+    name = str(name)
     for folder in _FOLDERS:
         if (folder / name / "trial.toml").is_file():
             return folder / name / "trial.toml"

@@ -260,14 +260,14 @@ def list_wrong_names(trial: Trial) -> list[str]:
 
 def _select_cameras(path: Path, trial: Trial, cameras: Sequence[str]) -> Trial:
     by_name = {camera.name: camera for camera in trial.camera}
-    if isinstance(cameras, str) or not cameras:
+    if isinstance(cameras, str) or not cameras or not all(isinstance(name, str) for name in cameras):
         raise TrialError(f"{path.name}: cameras = {cameras!r}; expected a list of names, of: {', '.join(by_name)}")
     unknown = [name for name in cameras if name not in by_name]
     if unknown:
         raise TrialError(f"{path.name}: no camera {', '.join(unknown)}; it has: {', '.join(by_name)}")
     twice = [name for name in by_name if cameras.count(name) > 1]
     if twice:
-        raise TrialError(f"--cameras names {', '.join(twice)} twice; name each camera once")
+        raise TrialError(f"cameras names {', '.join(twice)} twice; name each camera once")
     mend = [name for name in trial.calibration.mend if name in cameras]
     calibration = trial.calibration.model_copy(update={"mend": mend})
     masks = [mask for mask in trial.mask if mask.camera in cameras]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.cameras import Rig
-from airborne.errors import TrialError
+from airborne.errors import TrialError, require_choice
 from airborne.synthetic.block.margins import BodyVolume, gap_m
 from airborne.synthetic.block.players import (
     CLEARANCE_M,
@@ -105,15 +105,22 @@ def block_scene(
     seed: int,
     *,
     n_blockers: int = 1,
-    difficulty: Difficulty | None = None,
+    difficulty: Difficulty | str = "default",
+    frame_rate: int | None = None,
+    n_cameras: int | None = None,
     n_frames: int | None = None,
 ) -> BlockScene:
     """Draw a block of one to three players against a spiker, with decoys and three team mates in defence.
 
-    `n_frames` defaults to 82 at 60 frames/s, and to the same duration at other rates. Raises TrialError for an unusable
-    number.
+    `difficulty` is one of DIFFICULTIES by its name, or any other; frames per second and cameras are its own unless
+    given. `n_frames` defaults to 82 at 60 frames/s, and to the same duration at other rates. Raises
+    AirborneError for an unusable number or name.
     """
-    difficulty = difficulty or Difficulty()
+    if not isinstance(difficulty, Difficulty):
+        require_choice(difficulty, tuple(DIFFICULTIES), "difficulty")
+        difficulty = DIFFICULTIES[difficulty]
+    given = {"frame_rate": frame_rate, "n_cameras": n_cameras}
+    difficulty = replace(difficulty, **{name: value for name, value in given.items() if value is not None})
     if not 1 <= n_blockers <= 3:
         raise TrialError(f"{n_blockers} blockers were asked for; give 1 to 3")
     n_frames = n_frames or round(_MEAN_FRAMES * difficulty.frame_rate / 60)
