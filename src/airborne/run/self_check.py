@@ -127,8 +127,8 @@ def check_run(
     if not model.has_joints:
         scores, n_views = motion.score[rows], motion.n_views[rows]
         is_unlike = look_unlike(scores)
-        first = int(np.argmin(np.abs(path.index - begun.index)))
-        reasons[_UNLIKE] = np.append(np.zeros(first, bool), np.logical_and.accumulate(is_unlike[first:]))
+        begins = int(np.argmin(np.abs(path.index - begun.index)))
+        reasons[_UNLIKE] = np.append(np.zeros(begins, bool), np.logical_and.accumulate(is_unlike[begins:]))
         reasons[_UNLIKE_IN_FEWER] = is_unlike & (n_views < n_views.max())
         reasons[_STRAY] = find_strays(path, scores)
         flight = path.time_s, path.positions, path.rotations, path.covariance[:, :3, :3]
