@@ -161,7 +161,7 @@ def test_the_study_holds_no_outputs():
             lambda: ab.synthesise("block", "p", difficulty="cruel"),
             "difficulty 'cruel' is not known; choose easy or default",
         ),
-        (lambda: ab.read_trial("trial.toml", cameras=[1]), "cameras = [1]; expected a list of names"),
+        (lambda: ab.read_trial(ab.example_trial("thrown_cross"), cameras=[1]), "= [1]; expected a list of names"),
         (lambda: ab.example_trial(None), "there is no example 'None'"),
         (lambda: ab.synthesise("cross", "p", sed=3), "synthesise has no option sed; it has: preset"),
         (lambda: ab.smooth("results", "butterwort"), "choose butterworth or spline or kalman"),
