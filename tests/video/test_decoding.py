@@ -103,7 +103,9 @@ def test_times_start_at_the_first_image(tmp_path, name):
     )
     with av.open(path) as container:
         assert container.streams.video[0].start_time > 0
-    assert [picture.time_s for picture in read(path)[1]] == [Fraction(k, 25) for k in range(5)]
+    facts, seen = read(path)
+    assert [picture.time_s for picture in seen] == [Fraction(k, 25) for k in range(5)]
+    assert facts.duration_s is not None and abs(facts.duration_s - Fraction(5, 25)) <= Fraction(1, 25)
 
 
 def test_images_stored_out_of_order_come_in_order(tmp_path):

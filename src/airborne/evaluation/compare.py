@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from airborne.errors import ResultError
+from airborne.errors import ResultError, count
 from airborne.evaluation.columns import align_columns
 from airborne.evaluation.mix_ups import Paths, question_mix_up
 from airborne.evaluation.times import CLEARLY_BETTER, best_time_shift, match_times, question_shift, span
@@ -133,7 +133,7 @@ class MotionComparison:
         if self.n_singular:
             lines.append(f"{self.n_singular} frames near 90 degrees of tilt: their somersault and twist mean little")
         if self.n_flips:
-            lines.append(f"{self.n_flips} jumps between poses that look the same")
+            lines.append(f"{count(self.n_flips, 'jump')} between poses that look the same")
         for name, share in (("position", self.position_calibration), ("rotation", self.rotation_calibration)):
             if share.n:
                 lines.append(

@@ -104,7 +104,9 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
         yield "no jump was found"
     for jump in summary["jumps"]:
         hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
-        yield f"{jump['player']}, jump {jump['jump']}: {hips}, hips over standing (95 % interval)"
+        is_known = jump["hip_height_m"] is not None
+        said = f"{hips}, hips over standing (95 % interval)" if is_known else "how high the hips rose is not known"
+        yield f"{jump['player']}, jump {jump['jump']}: {said}"
         pairs = zip(_HEIGHTS[1:], others, strict=True)
         yield "  by other definitions: " + ", ".join(f"{what} {height}" for what, height in pairs)
         yield from (f"  {note}" for note in jump_notes(jump))

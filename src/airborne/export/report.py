@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from airborne.errors import ResultError, format_digits
+from airborne.errors import ResultError, count, format_digits
 from airborne.export.methods_text import SURFACES
 from airborne.export.page import UNKNOWN_TEXT, HtmlTable, format_with_sd, render_report
 from airborne.export.summary import body_warnings, headline, json_ready
@@ -163,7 +163,8 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
 
 
 def _tiles(head: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    yield _with_unit(head["duration_s"], "{:.3g} s"), f"at {_with_unit(head['rate_hz'], '{:.5g}')} frames a second"
+    if head["rate_hz"] is not None:
+        yield _with_unit(head["duration_s"], "{:.3g} s"), f"at {_with_unit(head['rate_hz'], '{:.5g}')} frames a second"
     yield _median_sd(head, "position", "mm"), "position, median standard deviation of an axis"
     yield _median_sd(head, "rotation", "deg"), "orientation, median standard deviation about an axis"
     if head["n_rotation_unobservable"] == head["n_tracked"] + head["n_uncertain"] > 0:
@@ -217,7 +218,7 @@ def _pose_comparison(title: str, comparison: Mapping[str, Any]) -> _Comparison:
     if errors["n_symmetries"] > 1:
         lines.append("Orientation up to the one symmetry of the body that suits the whole run best.")
     if errors["n_flips"]:
-        lines.append(f"{errors['n_flips']} jumps between orientations that look the same.")
+        lines.append(f"{count(errors['n_flips'], 'jump')} between orientations that look the same.")
     if "rigid_fit_residual_rms_mm" in comparison:
         lines.append(f"The clicked points fit a rigid body to {comparison['rigid_fit_residual_rms_mm']:.1f} mm RMS.")
     for what in ("position", "rotation"):

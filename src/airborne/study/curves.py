@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.errors import ResultError, require_choice
+from airborne.errors import ResultError, count, require_choice
 from airborne.io.text import read_csv
 from airborne.motion.run_folder import ANGLES, FLIGHT, JOINT_ANGLES, JOINTS
 from airborne.study.trials import LARGEST, StudyTrial
@@ -179,6 +179,6 @@ def _drop_unknown(
     is_known = np.isfinite(numbers[0]) & (np.abs(numbers[1]) < LARGEST)
     if is_known.sum() < _FEWEST or (np.diff(numbers[0][is_known]) <= 0).any():
         raise ResultError(
-            f"{trial.name}: {variable} is known in {is_known.sum()} frames, {_FEWEST} at least are needed"
+            f"{trial.name}: {variable} is known in {count(is_known.sum(), 'frame')}, {_FEWEST} at least are needed"
         )
     return RunCurve(*(column[is_known] for column in numbers))

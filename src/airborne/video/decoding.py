@@ -266,7 +266,8 @@ def snap_to_grid(time_s: Fraction, rate: Fraction, tick: Fraction) -> Fraction:
 def _duration_s(container: InputContainer, stream: VideoStream) -> Fraction | None:
     if stream.duration and stream.time_base:
         return stream.duration * stream.time_base
-    return Fraction(container.duration, av.time_base) if container.duration else None
+    begins = max(container.start_time or 0, 0)  # such containers count from 0, whenever their first image is shown
+    return Fraction(container.duration - begins, av.time_base) if container.duration else None
 
 
 def _field_order(stream: VideoStream, frame: av.VideoFrame) -> FieldOrder:

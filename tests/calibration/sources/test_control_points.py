@@ -28,6 +28,12 @@ def test_a_byte_mark_or_blank_rows_change_nothing(tmp_path, change):
     assert points.names == ("P1", "P2")
 
 
+@pytest.mark.parametrize("commas", [",", ",,,"])
+def test_lines_that_end_in_commas_are_read_without_them(tmp_path, commas):
+    points = read_control_points(written(tmp_path, GOOD.replace("\n", f"{commas}\n")))
+    assert points.cameras == ("a", "b") and points.px[1, 1].tolist() == [50, 60]
+
+
 def test_columns_may_stand_in_any_order(tmp_path):
     points = read_control_points(written(tmp_path, "b_v,z_m,b_u,point,x_m,y_m\n40,2,30,P1,0,1\n"))
     assert np.array_equal(points.world, [[0, 1, 2]])
@@ -54,6 +60,12 @@ def test_the_bundled_points_are_seen_by_three_cameras(points):
         (GOOD.replace("b_v", "c_v"), "camera 'b' has no column b_v"),
         ("point,x_m,y_m,z_m\nP1,0,1,2\n", "no camera columns"),
         (GOOD.replace("50", "fifty"), "row 3, column b_u: 'fifty' is not a number"),
+        (
+            GOOD.replace("50", "-"),
+            "'-' is not a number; give one, or leave both cells empty where the camera does not see",
+        ),
+        (GOOD.partition("\n")[2], "has no header: its first row holds numbers"),
+        (GOOD.replace("b_v\n", "b_v,\n").replace("60\n", "60,7\n"), "column '' is not <camera>_u"),
         (GOOD.replace("3,4,5", "3,inf,5"), "row 3, column y_m: 'inf' is not a number"),
         (GOOD.replace("3,4,5", "3,,5"), "row 3, column y_m: '' is not a number"),
         (GOOD.replace("50", ""), "row 3: camera 'b' has only one of u and v"),

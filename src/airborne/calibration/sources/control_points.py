@@ -104,11 +104,16 @@ def _read_rows(path: Path) -> list:
         raise CalibrationError(f"{path} is empty; {_EXPECTED}")
     if len(rows) == 1:
         raise CalibrationError(f"{path} has a header but no points; add a row for each control point")
+    while rows[0][1][-1:] == [""] and all(not any(row[len(rows[0][1]) - 1 :]) for _, row in rows):
+        last = len(rows[0][1]) - 1  # of lines that all end in a comma, as a spreadsheet writes them
+        rows = [(line, row[:last]) for line, row in rows]
     return [rows[0][1], *rows[1:]]
 
 
 def _check_header(path: Path, header: Sequence[str], *, needs_world: bool) -> tuple[str, ...]:
     """Return the cameras' names in the order of their columns."""
+    if "point" not in header and any(_is_number(name) for name in header):
+        raise CalibrationError(f"{path} has no header: its first row holds numbers; {_EXPECTED}")
     twice = sorted({name for name in header if header.count(name) > 1})
     if twice:
         raise CalibrationError(f"{path}: column '{twice[0]}' stands twice in the header; name each column once")
@@ -129,16 +134,19 @@ def _check_header(path: Path, header: Sequence[str], *, needs_world: bool) -> tu
     return cameras
 
 
-def _number(path: Path, line: int, column: str, text: str) -> float:
+def _is_number(text: str) -> bool:
     try:
-        value = float(text)
+        return bool(np.isfinite(float(text)))
     except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
+        return False
+
+
+def _number(path: Path, line: int, column: str, text: str, otherwise: str = "delete the row") -> float:
+    if not _is_number(text):
         raise CalibrationError(
-            f"{path}, row {line}, column {column}: '{text}' is not a number; give one, or delete the row"
+            f"{path}, row {line}, column {column}: '{text}' is not a number; give one, or {otherwise}"
         )
-    return value
+    return float(text)
 
 
 def _pixel(path: Path, line: int, camera: str, texts: Sequence[str]) -> tuple[float, float]:
@@ -149,5 +157,6 @@ def _pixel(path: Path, line: int, camera: str, texts: Sequence[str]) -> tuple[fl
         raise CalibrationError(
             f"{path}, row {line}: camera '{camera}' has only one of u and v; give both or leave both blank"
         )
-    u, v = (_number(path, line, f"{camera}_{axis}", text) for axis, text in zip("uv", texts, strict=True))
+    unseen = "leave both cells empty where the camera does not see the point"
+    u, v = (_number(path, line, f"{camera}_{axis}", text, unseen) for axis, text in zip("uv", texts, strict=True))
     return u, v
