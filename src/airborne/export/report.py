@@ -138,9 +138,9 @@ def write_report(folder: Path, summary: Mapping[str, Any], viewer: Viewer | None
     if missing:
         named = ", ".join(sorted(missing)[:3])
         raise ResultError(f"the summary of {folder} has no {named}, as of an older version; track again")
-    if "whole_run" in summary and "method" in summary:
-        surface = SURFACES[summary["whole_run"]]
-        summary = {**summary, "method": {**summary["method"], "whole_run": f"fitted by {surface}"}}
+    if "method" in summary:
+        whole_run = f"fitted by {SURFACES[summary['whole_run']]}" if "whole_run" in summary else None
+        summary = {**summary, "method": {**summary["method"], "whole_run": whole_run}}
     path = folder / REPORT
     of_joints = {"Joint angles": _JOINT_ANGLES} if (figures_of(folder) / "joints.png").is_file() else {}
     uncertainty = {"Uncertainty": f"{_UNCERTAINTY} {summary.get('uncertainty', '')}"}
