@@ -73,6 +73,9 @@ class RunThereError(ResultError):
     """A folder already holds a run, and nothing was said of going on with it or replacing it."""
 
 
+INSTALL_EXTRA = "which is not installed; in Airborne's folder: pip install -c constraints.txt '.[{}]'"
+
+
 def count(n: int, noun: str) -> str:
     """Return a number with its noun, as 1 camera or 2 cameras."""
     return f"{n} {noun if n == 1 else f'{noun}s'}"

@@ -10,11 +10,12 @@ import sys
 from asyncio import CancelledError
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from importlib.util import find_spec
 from multiprocessing import forkserver
 from typing import TYPE_CHECKING, Any
 
 from airborne.batch.task import Report, Task, TaskOutcome, do_task
-from airborne.errors import AirborneError, count
+from airborne.errors import INSTALL_EXTRA, AirborneError, count
 from airborne.io.environment import ONE_THREAD
 
 if TYPE_CHECKING:
@@ -58,6 +59,12 @@ def import_for_workers() -> None:
             os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
+def require_dask() -> None:
+    """Raise AirborneError where Dask is not installed."""
+    if find_spec("dask") is None or find_spec("distributed") is None:
+        raise AirborneError(f"batches need Dask, {INSTALL_EXTRA.format('batch')}")
+
+
 @contextmanager
 def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[Client]:
     """Connect to a scheduler by its address, or start one with workers of one thread on this machine.
@@ -66,11 +73,10 @@ def open_client(scheduler: str | None, n_workers: int, memory: str) -> Iterator[
     another machine keep what they were started with, and `memory` is the least of it. Raises AirborneError where Dask
     is not installed, the scheduler cannot be reached, or there is not so much memory.
     """
-    try:
-        from dask import config
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise AirborneError("batches need Dask; install the extra: pip install 'airborne[batch]'") from None
+    require_dask()
+    from dask import config
+    from distributed import Client, LocalCluster
+
     least_bytes = _parse_memory(memory, n_workers if scheduler is None else 0)
     for logger in ("distributed", "distributed.client"):  # what goes wrong is told once, by the row of its trial
         logging.getLogger(logger).setLevel(logging.CRITICAL)

@@ -39,9 +39,11 @@ def batch_command(
 
     Example: airborne batch trials -o results --workers 4
     """
+    from airborne.batch.cluster import require_dask
     from airborne.batch.run import Machines, describe_plan, plan_tasks, run_batch
     from airborne.batch.trials import list_trials
 
+    require_dask()
     listed = list_trials(trials)
     if dry_run:
         lines, is_sound = describe_plan(plan_tasks(listed, output, pictures=pictures))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from airborne.errors import AirborneError
+from airborne.errors import INSTALL_EXTRA, AirborneError
 from airborne.study.random_effects import Difference
 from airborne.types import Array, Mask
 
@@ -40,7 +40,7 @@ def check_spm1d() -> None:
     try:
         import spm1d as spm1d
     except ImportError:
-        raise AirborneError("comparing curves needs spm1d; install the extra: pip install 'airborne[batch]'") from None
+        raise AirborneError(f"comparing curves needs spm1d, {INSTALL_EXTRA.format('batch')}") from None
 
 
 def compare_curves(difference: Difference, alpha: float) -> CurveTest:
