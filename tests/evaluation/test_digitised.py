@@ -107,6 +107,18 @@ def test_bundled_clicks_are_near_the_truth(thrown_cross, rig, truth):
     assert 1 < result.rigid_fit_residual_rms_mm < 10
 
 
+@pytest.mark.parametrize(("axis", "order"), [(2, [1, 0, 2]), (1, [1, 0, 2, 3])], ids=["cameras", "points"])
+def test_clicks_that_do_not_fit_the_body_are_asked_about(rig, truth, axis, order):
+    seen = clicks(truth, rig, noise_px=1.0)
+    right, wrong = (
+        compare_digitised(motion_of(truth), fit_digitised_poses(each, rig, cross()), HALF_TURN)
+        for each in (seen, replace(seen, px=np.take(seen.px, order, axis=axis)))
+    )
+    assert right.questions == ()
+    assert [each for each in wrong.questions if "are cameras' columns or points exchanged" in each]
+    assert "are cameras' columns or points exchanged" in wrong.describe()
+
+
 def test_difference_is_tracked_minus_digitised_by_frame_number(rig, truth):
     motion = shifted(motion_of(truth), [0.005, 0, 0])
     poses = fit_digitised_poses(clicks(truth, rig), rig, cross())
