@@ -67,7 +67,7 @@ def write_uncertainty(path: Path, motion: Motion, constant: Array) -> None:
     constant (n, 6, 6): covariance of the lasting ones [m, rad].
     """
     total = np.hstack([motion.position_sd, motion.rotation_sd])
-    lasting = np.fmin(np.sqrt(np.diagonal(constant, axis1=1, axis2=2)), total)  # theirs is interpolated over frames
+    lasting = np.fmin(np.sqrt(np.diagonal(constant, axis1=1, axis2=2)), total)  # frames hold some of it
     own = np.sqrt(np.diagonal(motion.covariance, axis1=1, axis2=2))[:, :6]
     by_frame = np.sqrt(np.maximum(total**2 - lasting**2, own**2 / 4))  # own sds hold some that lasts
     columns: dict[str, NDArray] = {"frame": motion.index, "time_s": motion.time_s}

@@ -141,7 +141,7 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def _number(path: Path, line: int, column: str, text: str, otherwise: str = "delete the row") -> float:
+def _number(path: Path, line: int, column: str, text: str, *, otherwise: str = "delete the row") -> float:
     if not _is_number(text):
         raise CalibrationError(
             f"{path}, row {line}, column {column}: '{text}' is not a number; give one, or {otherwise}"
@@ -158,5 +158,6 @@ def _pixel(path: Path, line: int, camera: str, texts: Sequence[str]) -> tuple[fl
             f"{path}, row {line}: camera '{camera}' has only one of u and v; give both or leave both blank"
         )
     unseen = "leave both cells empty where the camera does not see the point"
-    u, v = (_number(path, line, f"{camera}_{axis}", text, unseen) for axis, text in zip("uv", texts, strict=True))
+    named = zip([f"{camera}_u", f"{camera}_v"], texts, strict=True)
+    u, v = (_number(path, line, column, text, otherwise=unseen) for column, text in named)
     return u, v

@@ -28,7 +28,8 @@ MOST_MISS_M, _FAR_MISS_M, _LEAST_GAIN = 0.05, 0.08, 0.03
 def start_misses_m(starts: Sequence[PlayerStart], frames: Frames) -> Array:
     """Return how far the images put hips, knees and ankles from where each start with legs has them: (players,) [m].
 
-    The mean of the six; NaN where the images show nobody there, or hardly less at the start. About 0.1 s a player.
+    The mean of the six; NaN where the images show nobody there, or are explained as well at the start. About
+    0.1 s a player.
     """
     misses_m = np.full(len(starts), np.nan)
     states = [start_state(start.name, start.joints_m) for start in starts]

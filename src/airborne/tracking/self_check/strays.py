@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from airborne.geometry.sampling import chi2_quantile
 from airborne.tracking.self_check.path import TrackedPath
@@ -27,12 +28,13 @@ def find_strays(path: TrackedPath, scores: Array) -> NDArray[np.bool_]:
     n = len(path.index)
     if n < _FEWEST:
         return np.zeros(n, bool)
-    around = np.array([_around(path, row) for row in range(n)])
+    around = _rows_around(n)
     spans = np.ptp(np.column_stack([path.index[around], path.index]), axis=1)
     period = np.median(np.diff(path.index))
     weights = _cubic_weights(path.time_s[around] - path.time_s[:, None])
-    rotations = [pose.world_from_root.rotation for pose in path.poses]
-    vectors = np.array([[(rotations[i].inv() * rotations[j]).as_rotvec() for j in around[i]] for i in range(n)])
+    rotations = Rotation.from_matrix(path.rotations)
+    own = np.repeat(np.arange(n), _AROUND)
+    vectors = (rotations[own].inv() * rotations[around.ravel()]).as_rotvec().reshape(n, _AROUND, 3)
     is_far = np.zeros(n, bool)
     for offsets in (path.positions[around] - path.positions[:, None], vectors):
         distances = np.linalg.norm(np.einsum("nk,nkd->nd", weights, offsets), axis=1)
@@ -43,11 +45,11 @@ def find_strays(path: TrackedPath, scores: Array) -> NDArray[np.bool_]:
     return is_far & is_unlike & (spans <= _WIDEST * period)
 
 
-def _around(path: TrackedPath, row: int) -> NDArray[np.intp]:
-    """Return the rows of the poses nearest in time, without its own."""
-    away_s = np.abs(path.time_s - path.time_s[row])
-    away_s[row] = np.inf
-    return np.sort(np.argsort(away_s, kind="stable")[:_AROUND])
+def _rows_around(n: int) -> NDArray[np.intp]:
+    """Return, for each of n rows, those around it without its own: (n, 4)."""
+    rows = np.arange(n)
+    windows = np.clip(rows - _AROUND // 2, 0, n - _AROUND - 1)[:, None] + np.arange(_AROUND + 1)
+    return windows[windows != rows[:, None]].reshape(n, _AROUND)
 
 
 def _cubic_weights(times_s: Array) -> Array:
