@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from airborne.cli.console import Json, Out, errors, progress, stop
+from airborne.cli.console import Json, Out, progress, stop
 from airborne.cli.results import evaluate_command
 from airborne.errors import AirborneError, count, count_of, format_digits
 from airborne.io.terminal import Stages
@@ -139,8 +139,6 @@ def _track(
     if names == []:
         raise AirborneError("--cameras names no camera; give their names, separated by commas")
     began_s = time.time()
-    if resume and not any((output / table).is_file() for table in _FIRST_WRITTEN):
-        errors.print(f"note: {output} holds no run to resume: it is tracked from the start", markup=False)
     try:
         with Stages() as report:
             report("opening videos", 0, None)  # at once, as even loading the modules takes seconds

@@ -53,10 +53,10 @@ def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Itera
         yield f"{few} of {n} frames {rest} on fewer than two cameras, so that depth is a guess"
     n_posed = player["n_tracked"] + player["n_uncertain"]
     if not player["n_tracked"] and not summary.get("self_check"):  # which says why
-        is_for_some = doubts and not any(each.startswith("all joints") for each in doubts)
+        is_by_sd = doubts and all("sd over" in each and not each.startswith("all joints") for each in doubts)
         yield "no frame was tracked, so none of these numbers can be relied on: " + (
             "in each some joint is uncertain, as said above"
-            if is_for_some
+            if is_by_sd
             else "are the joints of [[start.player]] those of the frame of [start]? `airborne track --first-frame` "
             "draws them there"
         )
