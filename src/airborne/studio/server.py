@@ -42,7 +42,8 @@ from airborne.studio.writing import FOLDER
 _HOST = "127.0.0.1"
 _ADDRESS, _LONGEST_ADDRESS = "address", 200  # the file that holds it; bytes
 _SOON_S = 0.05  # between looks whether the server listens
-_PATIENCE_S = 20.0  # for a window whose computer is busy: sooner taken for closed, it would begin anew
+# for a window whose computer is busy: sooner taken for closed, it would begin anew; and for a page to be built there
+_PATIENCE_S = 20.0
 _STYLE = Path(__file__).with_name("studio.css")
 _PAGES = {
     "/": videos_page,
@@ -98,7 +99,8 @@ def _serve(session: Session, port: int, token: str, *, browser: bool) -> None:
     here = session.place.page if session.place.page in _PAGES else "/"
     address = f"http://{_HOST}:{port}{here}?token={token}"
     for url, build in _PAGES.items():
-        ui.page(url, title=f"Airborne: {session.folder.name}")(_page(url, build, session))
+        page = ui.page(url, title=f"Airborne: {session.folder.name}", response_timeout=_PATIENCE_S)
+        page(_page(url, build, session))
     add_routes(app, session)
     ui.add_css(_STYLE, shared=True)
     app.add_middleware(Guard, token=token, port=port)
