@@ -42,7 +42,8 @@ from airborne.studio.writing import FOLDER
 _HOST = "127.0.0.1"
 _ADDRESS, _LONGEST_ADDRESS = "address", 200  # the file that holds it; bytes
 _SOON_S = 0.05  # between looks whether the server listens
-# for a window whose computer is busy: sooner taken for closed, it would begin anew; and for a page to be built there
+# chosen: for a window whose computer is busy, which sooner would be taken for closed and begin anew, and for a page
+# to be built there
 _PATIENCE_S = 20.0
 _STYLE = Path(__file__).with_name("studio.css")
 _PAGES = {

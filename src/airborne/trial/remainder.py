@@ -12,7 +12,7 @@ from airborne.trial.file import Trial
 from airborne.trial.session import read_tables
 
 _MOST_MISTAKES = 100  # after which nothing is left
-_ANYBODY = {"preset": "human18", "stature_m": 1.75, "mass_kg": 70.0}  # in place of a body that cannot be read
+_ANYBODY = {"preset": "human18", "stature_m": 1.75, "mass_kg": 70.0}  # chosen: any, for one that cannot be read
 
 
 class Remainder(NamedTuple):

@@ -17,7 +17,7 @@ from airborne.tracking.players import PlayerStart
 from airborne.types import Array
 from airborne.video import Frames
 
-# times as uncertain as by hand are joints and legs' lengths here
+# chosen: times as uncertain as by hand are joints and legs' lengths here
 _LOOSER, _FREER = 6.0, 4.0
 # how far off a start is then said to be [m]; nearer than the second, where that explains the images better by a share.
 # Chosen between 39 right starts, of synthetic blocks and block_jump, 21 to 51 mm off and one 66, which that explains by

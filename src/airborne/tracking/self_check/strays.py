@@ -14,7 +14,7 @@ from airborne.geometry.sampling import chi2_quantile
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.types import Array
 
-_AROUND = 4  # chosen: poses that a cubic is laid through
+_AROUND = 4  # poses: a cubic has as many numbers
 _WIDEST = 6  # chosen: frames that they may span, as no cubic follows a thing for longer
 _FEWEST = 8  # chosen: poses of a run whose scatter is known
 _QUIET = 0.25  # chosen: quantile of distances that tells the scatter, as each stray makes eight others large
