@@ -11,6 +11,7 @@ from airborne.errors import count_of
 from airborne.export.summary import describe_lost
 from airborne.motion.jumps.jump import are_legs_lost, is_no_fall
 from airborne.motion.jumps.standing_posture import NEAR_S, WINDOW_S
+from airborne.motion.players_doubts import are_of_single_joints
 
 _PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
 
@@ -53,7 +54,7 @@ def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Itera
         yield f"{few} of {n} frames {rest} on fewer than two cameras, so that depth is a guess"
     n_posed = player["n_tracked"] + player["n_uncertain"]
     if not player["n_tracked"] and not summary.get("self_check"):  # which says why
-        is_by_sd = doubts and all("sd over" in each and not each.startswith("all joints") for each in doubts)
+        is_by_sd = are_of_single_joints(doubts or ())
         yield "no frame was tracked, so none of these numbers can be relied on: " + (
             "in each some joint is uncertain, as said above"
             if is_by_sd

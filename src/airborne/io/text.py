@@ -113,6 +113,7 @@ def read_json(path: Path) -> Any:
 def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[int, list[str]]]:
     """Read the non-empty rows of a comma-separated table: the line number, from 1, and the stripped cells.
 
+    Columns at the end that hold nothing in any row are left out, as a spreadsheet ends its lines in commas.
     Raises `error`, saying in one line what was found and what is `expected`.
     """
     try:
@@ -129,6 +130,8 @@ def read_csv(path: Path, expected: str, error: type[Exception]) -> list[tuple[in
     except csv.Error as failure:
         raise error(f"{path}, row {reader.line_num}: not a table with commas ({failure}); {expected}") from None
     rows = [(line, row) for line, row in rows if any(row)]
+    n_columns = max((i for _, row in rows for i, cell in enumerate(row, start=1) if cell), default=0)
+    rows = [(line, row[:n_columns]) for line, row in rows]
     header = rows[0][1] if rows else []
     for separator, name in _SEPARATORS.items():
         if len(header) == 1 and separator in header[0]:

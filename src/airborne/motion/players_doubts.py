@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from airborne.cameras.finding import join_names
 from airborne.motion.players import PlayersMotion
 from airborne.tracking import Status
 
+_ALL_JOINTS, _SD_OVER = "all joints", "sd over"
 _PLURALS = {"hip": "hips", "knee": "knees", "ankle": "ankles", "foot": "feet", "wrist": "wrists"}
 
 
@@ -29,13 +30,18 @@ def describe_player_doubts(
     is_wide = ~is_alone & (sd >= most_sd_m)
     reasons = {
         "fewer than two cameras show the player": is_alone,
-        f"sd over {100 * most_sd_m:.0f} cm": is_wide,
+        f"{_SD_OVER} {100 * most_sd_m:.0f} cm": is_wide,
         "images show them worse than usual": ~is_alone & ~is_wide,
     }
     for why, has_reason in reasons.items():
         said = [f"{what} in {where}" for what, where in _places(motion, is_uncertain & has_reason)]
         if said:
             yield f"{', '.join(said)}: {why}"
+
+
+def are_of_single_joints(doubts: Sequence[str]) -> bool:
+    """Say whether there are doubts, each of single joints' deviations and none of all joints at once."""
+    return bool(doubts) and all(_SD_OVER in each and not each.startswith(_ALL_JOINTS) for each in doubts)
 
 
 def _places(motion: PlayersMotion, is_in: NDArray[np.bool_]) -> Iterator[tuple[str, str]]:
@@ -56,4 +62,4 @@ def _places(motion: PlayersMotion, is_in: NDArray[np.bool_]) -> Iterator[tuple[s
         n = int(np.any(list(parts.values()), axis=0).sum())
         frames = f"frames {motion.index[first]} to {motion.index[last]}" if n > 1 else f"frame {motion.index[first]}"
         where = frames if n == last - first + 1 else f"{n} of {frames}"
-        yield "all joints" if len(parts) == len(by_part) > 1 else join_names(list(parts)), where
+        yield _ALL_JOINTS if len(parts) == len(by_part) > 1 else join_names(list(parts)), where

@@ -104,9 +104,6 @@ def _read_rows(path: Path) -> list:
         raise CalibrationError(f"{path} is empty; {_EXPECTED}")
     if len(rows) == 1:
         raise CalibrationError(f"{path} has a header but no points; add a row for each control point")
-    while rows[0][1][-1:] == [""] and all(not any(row[len(rows[0][1]) - 1 :]) for _, row in rows):
-        last = len(rows[0][1]) - 1  # of lines that all end in a comma, as a spreadsheet writes them
-        rows = [(line, row[:last]) for line, row in rows]
     return [rows[0][1], *rows[1:]]
 
 

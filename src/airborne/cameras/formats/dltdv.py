@@ -158,9 +158,8 @@ def _read_table(path: Path) -> tuple[list[str], Array]:
     header = rows[0][1] if rows else []
     values = np.full((max(len(rows) - 1, 0), len(header)), np.nan)
     for number, (line, row) in enumerate(rows[1:]):
-        cells = row[:-1] if len(row) == len(header) + 1 and not row[-1] else row
         try:
-            values[number] = np.reshape([float(cell) if cell else np.nan for cell in cells], len(header))
+            values[number] = np.reshape([float(cell) if cell else np.nan for cell in row], len(header))
         except ValueError:
             columns = ",".join(header)[:80]
             raise CalibrationError(
