@@ -158,7 +158,7 @@ def outline_of(silhouette: Silhouette, posed: PosedBody) -> SilhouetteOutline:
     """Differentiate a silhouette's outline."""
     C, B = _outline_derivatives(silhouette, posed)
     in_view = to_px(silhouette)
-    by_twist = np.linalg.lstsq(B.T, C.T, rcond=1e-6)[0][:N_SIMILARITY]
+    by_twist = (np.linalg.pinv(B @ B.T, rcond=1e-12, hermitian=True) @ B @ C.T)[:N_SIMILARITY]
     return SilhouetteOutline(by_twist * in_view[:, None], C @ C.T, C @ B[:N_SIMILARITY].T / in_view)
 
 
