@@ -82,7 +82,7 @@ def calibrate_from(sources: Sources, progress: StageProgress) -> RigCalibration:
         )  # triangulated anew by better cameras
     frame = choose_world_frame(inputs, adjustment, [m.camera.name for m in mended])
     final = adjustment if frame.is_unchanged else _adjust_in_world(adjustment, frame, progress)
-    if frame.is_unchanged and sources.kinds == ["control_points"]:
+    if frame.is_unchanged and inputs.are_surveyed_points:
         final = _with_lens_model_error(inputs, final)
     held_out_px = cross_validate(final, lambda done, n: progress("leaving out and predicting", done, n))
     lags = _lags(final) if lag_sd_s is not None else {}

@@ -43,6 +43,8 @@ def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Itera
     if player["n_lost"] == n:
         yield "found in no frame: nothing was measured"
         return
+    if start_doubt := player.get("start_doubt"):
+        yield start_doubt
     if player["n_lost"]:
         yield describe_lost(player["n_lost"], n)
     if doubts := player.get("doubts"):
@@ -53,7 +55,7 @@ def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Itera
         rest = "rests" if few == 1 else "rest"
         yield f"{few} of {n} frames {rest} on fewer than two cameras, so that depth is a guess"
     n_posed = player["n_tracked"] + player["n_uncertain"]
-    if not player["n_tracked"] and not summary.get("self_check"):  # which says why
+    if not player["n_tracked"] and not start_doubt and not summary.get("self_check"):  # which say why
         is_by_sd = are_of_single_joints(doubts or ())
         yield "no frame was tracked, so none of these numbers can be relied on: " + (
             "in each some joint is uncertain, as said above"

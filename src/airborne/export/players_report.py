@@ -103,19 +103,24 @@ def players_summary(summary: Mapping[str, Any]) -> Iterator[str]:
     if not summary["jumps"] and summary["n_frames"] > 1:
         yield "no jump was found"
     for jump in summary["jumps"]:
-        hips, *others = (_interval_cm(jump, what) for what in _HEIGHTS)
-        is_known = jump["hip_height_m"] is not None
-        said = f"{hips}, hips over standing (95 % interval)" if is_known else "how high the hips rose is not known"
-        yield f"{jump['player']}, jump {jump['jump']}: {said}"
-        pairs = zip(_HEIGHTS[1:], others, strict=True)
+        yield describe_jump(jump)
+        pairs = ((what, _interval_cm(jump, what)) for what in _HEIGHTS[1:])
         yield "  by other definitions: " + ", ".join(f"{what} {height}" for what, height in pairs)
         yield from (f"  {note}" for note in jump_notes(jump))
     yield from drop_notes(summary)
 
 
+def describe_jump(jump: Mapping[str, Any]) -> str:
+    """Say how high the hips rose in a jump of a summary, the height to quote."""
+    height = _interval_cm(jump, _HEIGHTS[0])
+    is_known = jump["hip_height_m"] is not None
+    said = f"{height}, hips over standing (95 % interval)" if is_known else "how high the hips rose is not known"
+    return f"{jump['player']}, jump {jump['jump']}: {said}"
+
+
 def _player_record(name: str, player: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the report's table shows of a player; doubts stand below it."""
-    return {"player": name, **{key: value for key, value in player.items() if key != "doubts"}}
+    return {"player": name, **{key: value for key, value in player.items() if "doubt" not in key}}
 
 
 def _jump_record(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from airborne.run.opening import (
     video_source,
 )
 from airborne.run.players_mix_ups import refuse_players_mix_ups
-from airborne.run.players_tracker import doubt_starts, player_starts, players_tracker_of, start_notes
+from airborne.run.players_tracker import doubt_starts, list_doubts, player_starts, players_tracker_of, start_notes
 from airborne.trial.file import Trial, list_wrong_names, parse_trial
 from airborne.trial.remainder import Remainder, parse_remainder
 from airborne.video import Recording, VideoFacts, inspect
@@ -192,7 +192,7 @@ def _check_start(checks: Checks, trial: Trial, facts: Sequence[VideoFacts]) -> N
             begun = next(iter(first), None)
             if len(recording.rig) > 1:
                 checks.attempt(lambda: refuse_players_mix_ups(starts, begun), lambda _: _NO_MIX_UP)
-            checks.doubts += doubt_starts(starts, begun).values()
+            checks.doubts += list_doubts(doubt_starts(starts, begun))
     else:
         model = trial.model()
         found = checks.attempt(

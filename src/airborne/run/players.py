@@ -59,7 +59,7 @@ class PlayersRun:
     players: PlayersTracker
     starts: tuple[PlayerStart, ...]
     cameras: CameraCheck = field(default_factory=CameraCheck)  # grows while the run is tracked
-    doubtful: tuple[str, ...] = ()  # players whose starts cannot be believed
+    start_doubts: Mapping[str, str] = field(default_factory=dict)  # by the players whose starts cannot be believed
 
     table = JOINTS
 
@@ -91,9 +91,7 @@ class PlayersRun:
     def see(self, first: Frames) -> PlayersRun:
         """Return the players with doubts of their starts; their trackers learn from the first frames themselves."""
         is_live = not isinstance(self.recording, Recording)  # then frames do not wait
-        doubts = doubt_starts(self.starts, None if is_live else first)
-        self.recording.events.extend(doubts.values())
-        return replace(self, doubtful=tuple(doubts))
+        return replace(self, start_doubts=doubt_starts(self.starts, None if is_live else first))
 
     def track(
         self,
@@ -143,7 +141,7 @@ class PlayersRun:
     ) -> tuple[PlayersMotion, dict[str, Any]]:
         """Write the tables; return the motion and the beginning of the summary."""
         written = read_players(folder / self.table)
-        tracked = written.without_tracked(self.doubtful)
+        tracked = written.without_tracked(tuple(self.start_doubts))
         motion = without_untracked(tracked)
         wrong = find_wrong_gravity(motion)
         if wrong is not None:
@@ -183,6 +181,7 @@ class PlayersRun:
             "rate_hz": round(float(recording.rate), 6),
             "players": {
                 name: {**_player(motion, k, len(recording.rig)), "doubts": doubts.get(name, [])}
+                | ({"start_doubt": self.start_doubts[name]} if name in self.start_doubts else {})
                 for k, name in enumerate(motion.players)
             },
             "bystanders": [start.name for start in self.starts if not start.has_legs],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import combinations
 from pathlib import Path
@@ -119,16 +119,21 @@ def doubt_starts(starts: Sequence[PlayerStart], first: Frames | None) -> dict[st
         over_m = min(start.joints_m["ankle_left"][2], start.joints_m["ankle_right"][2])
         if over_m > _MOST_ABOVE_FLOOR_M:
             doubts[start.name] = (
-                f"player '{start.name}': both ankles lie {over_m:.2f} m or more over the floor, z = 0, so no frame "
+                f"both ankles lie {over_m:.2f} m or more over the floor, z = 0, so no frame "
                 "counts as tracked: start where the player stands, or correct the joints or the floor"
             )
         elif miss_m > MOST_MISS_M:
             doubts[start.name] = (
-                f"player '{start.name}': the images of the first frame show hips, knees and ankles "
+                f"the images of the first frame show hips, knees and ankles "
                 f"{100 * miss_m:.0f} cm from where [[start.player]] has them, so no frame counts as tracked: are they "
                 "of this frame and player, and at the right height?"
             )
     return doubts
+
+
+def list_doubts(doubts: Mapping[str, str]) -> list[str]:
+    """Return doubts of players' starts as sentences of their own, each with its player."""
+    return [f"player '{name}': {doubt}" for name, doubt in doubts.items()]
 
 
 def _cosine(a: Array, b: Array) -> float:

@@ -27,3 +27,12 @@ export function pressBlue() {
   const button = near.at(-1) || (cards.size === 1 && seen.at(-1));
   if (button && here.tagName !== "BUTTON") button.click();
 }
+
+// A decimal comma is a point: number fields of an English browser leave it out, and 47,5 becomes 475.
+document.addEventListener("beforeinput", (event) => {
+  const text = event.data ?? event.dataTransfer?.getData("text/plain");
+  if (event.target.type !== "number" || !text?.includes(",")) return;
+  event.preventDefault();
+  const number = text.includes(".") ? text.replaceAll(",", "") : text.replace(",", ".");
+  document.execCommand("insertText", false, number);
+});

@@ -48,6 +48,11 @@ class Inputs:
     notes: tuple[str, ...]
     findings: tuple[Finding, ...]  # what is wrong with the recordings and initial values
 
+    @property
+    def are_surveyed_points(self) -> bool:
+        """Whether there is nothing but points of exactly known places."""
+        return len(self.points) == len(self.sources.kinds) and all(each.sd_m is None for each in self.points.values())
+
 
 def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     """Read all sources and find initial cameras; raises an AirborneError for what cannot be used."""
@@ -70,8 +75,7 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     if sources.detections is not None:
         own = sources.detections
         detections = read_detections(sources.path(own.file), sources.names, own.cameras, skeleton=own.skeleton)
-    if "control points" in points and start_rig is None:
-        table = points["control points"]
+    for table in points.values() if start_rig is None else ():
         unknown = [name for name in _common(table.cameras, sizes) if name not in lenses]
         lenses |= lenses_from_points(
             initial_rig_from_points(table.select(unknown), sizes, fisheyes=fisheyes),
@@ -283,12 +287,12 @@ def _n_observations(name: str, points: dict[str, ControlPoints], wand: WandTrack
 
 def _free_parameters(camera: CameraSource, fit: LensFit | None, has_start: bool, n_observations: int) -> FreeParameters:
     """Return the free parameters: the lens model that the board supports, else as many as the data support."""
-    if fit is not None:
-        own = fit.free
-    elif has_start and camera.focal in ("auto", "fixed"):
+    if fit is None and has_start and camera.focal in ("auto", "fixed"):
         return FreeParameters(focal=False)
-    else:
-        own = FreeParameters(n_terms=0 if has_start else 2 if n_observations >= _MANY_OBSERVATIONS else 0)
+    own = FreeParameters() if fit is None else fit.free
+    n_others = n_observations - (fit.n_views if fit is not None else 0)
+    if (fit is None or fit.is_of_points) and not has_start and n_others >= _MANY_OBSERVATIONS:
+        own = replace(own, n_terms=max(own.n_terms, 2))
     if camera.focal == "fixed":
         return replace(own, focal=False)
     return replace(own, shares_focal="shared") if camera.focal == "shared" else own

@@ -90,6 +90,11 @@ def _numbers(summary: dict[str, Any]) -> None:
                     ):
                         with ui.element(tag):
                             ui.label(text)
+    if jumps := summary.get("jumps"):
+        from airborne.export.players_report import describe_jump  # which imports Matplotlib
+
+        for jump in jumps:
+            ui.label(describe_jump(jump)).classes("small")
     findings = summary.get("self_check") or []
     alarming = alarms(findings)
     for text in summary.get("warnings") or []:

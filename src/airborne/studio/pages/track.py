@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.errors import STOPPED, AirborneError, TrialError, count
-from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY
+from airborne.errors import STOPPED, AirborneError, ResultError, TrialError, count
+from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY, read_summary
 from airborne.studio.commands import Command
 from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
 from airborne.studio.pages.track_settings import TrackSettingsBar
@@ -21,6 +22,7 @@ from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Curves
 
 _LOOK_EVERY_S = 1.0  # at a run that goes on
+_UNTRACKED = 1  # exit code of a whole run of which hardly a frame is tracked
 _HELP = (
     "Tracking runs in a process of its own: go on working, or close the browser. "
     "A run that is stopped keeps its frames and goes on where it was. To try another method, name another folder."
@@ -229,9 +231,17 @@ class _Panel:
         elif command.code == STOPPED:
             self._tell("stopped")
         else:
-            self._tell(command.complaint(), is_wrong=True)
-            complain(command.complaint())
+            said = self._say_untracked(command) if command.code == _UNTRACKED else command.complaint()
+            self._tell(said, is_wrong=True)
+            complain(said)
         self._show_buttons()
+
+    def _say_untracked(self, command: Command) -> str:
+        """Say how many frames of a whole run were tracked, hardly any, and the first reason that it has for that."""
+        counts = command.output().partition("\n")[0]
+        with suppress(ResultError):
+            return ". ".join([counts, *read_summary(self.folder).get("warnings", [])[:1]])
+        return counts
 
     def _tell(self, text: str, *, is_wrong: bool = False) -> None:
         """Show a line beside the buttons, until there is another."""
