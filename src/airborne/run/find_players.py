@@ -18,6 +18,7 @@ from airborne.run.find import (
     require_two_cameras,
     take_candidate,
 )
+from airborne.run.players_tracker import doubt_starts, list_doubts
 from airborne.run.sample import look_through
 from airborne.tracking import Status
 from airborne.tracking.backward import turn_time
@@ -73,7 +74,8 @@ def find_players_start(
         f"[[start.player]]: {count(len(starts), 'player')} found, who {stand} out best in frame {finding.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
-    return FoundPlayers(_with_start(trial, frame, starts), finding, facts, (note,))
+    in_the_air = list_doubts(doubt_starts(starts, None))
+    return FoundPlayers(_with_start(trial, frame, starts), finding, facts, (note, *in_the_air))
 
 
 def _ask_for_help(trial: Trial, finding: PlayersSearch, folder: Path) -> UndecidedError:

@@ -12,14 +12,14 @@ from typing import Literal, get_args
 
 from airborne.cameras import Camera, Rig
 from airborne.errors import VideoError
+from airborne.video.checks import check_exposures, check_overlap, describe_fields
 from airborne.video.decoding import DecodedImage, VideoFacts, VideoSource, decode, inspect, rgb_from_decoded
 from airborne.video.fields import fill_rows
 from airborne.video.frames import Frames, View
 from airborne.video.gaps import describe_gaps
 from airborne.video.lazy import ConversionCache, lazy_view
-from airborne.video.outages import N_LISTED
 from airborne.video.prefetch import read_ahead
-from airborne.video.repeats import PictureChanges, describe_repeat
+from airborne.video.repeats import PictureChanges, describe_repeats
 from airborne.video.sizes import check_sizes
 from airborne.video.undistortion import Undistortion, undistortion_of
 
@@ -46,6 +46,7 @@ class Recording:
     is_lazy: bool = False
     events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
     _gaps: dict[str, dict[Fraction, Fraction]] = field(default_factory=dict)  # of each camera, from -> to [s]
+    _repeats: dict[str, list[tuple[int, int]]] = field(default_factory=dict)  # of each camera, first and last frames
     _known: dict[tuple[str, bool], tuple[Camera, dict[int | None, Undistortion]]] = field(default_factory=dict)
     _changes: dict[str, PictureChanges] = field(default_factory=dict)  # of each camera's pictures, looked at once
 
@@ -133,9 +134,10 @@ class Recording:
                 time_s = source.trial_time(image.time_s)
                 if time_s > expected_s + period_s / 2:
                     self._note_gap(source.name, expected_s, time_s)
-                if (repeated_s := changes.add(image)) is not None and changes.n_repeated <= N_LISTED:
-                    self._note_repeated(source, repeated_s)
-                yield image._replace(time_s=time_s)
+                if changes.add(image):
+                    self._note_repeated(source, time_s)
+                else:
+                    yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
         if changes.is_still:
             self._note(f"{source.name}: its pictures are all the same: is the video a still one?")
@@ -145,9 +147,18 @@ class Recording:
                 f"{source.name}: the images end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
             )
 
-    def _note_repeated(self, source: VideoSource, file_s: Fraction) -> None:
-        time_s, start_s = source.trial_time(file_s), self.sources[0].trial_time(Fraction(0))
-        self._note(describe_repeat(source.name, round((time_s - start_s) * self.facts[0].image_rate), time_s))
+    def _note_repeated(self, source: VideoSource, time_s: Fraction) -> None:
+        """Note a repeated image in the line that says all of its camera's, and of those whose are the same."""
+        frame = round((time_s - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
+        runs = self._repeats.setdefault(source.name, [])
+        if runs and frame <= runs[-1][1]:
+            return  # a recording may be read twice
+        before = set(describe_repeats(self._repeats))
+        if runs and frame == runs[-1][1] + 1:
+            runs[-1] = runs[-1][0], frame
+        else:
+            runs.append((frame, frame))
+        self.events[:] = [*(event for event in self.events if event not in before), *describe_repeats(self._repeats)]
 
     def _note_gap(self, name: str, from_s: Fraction, to_s: Fraction) -> None:
         """Note a gap in the line that says all of a camera's."""
@@ -198,53 +209,11 @@ def open_recording(
     ordered = tuple(sources[by_name[name]] for name in rig.names)
     ordered_facts = tuple(facts[by_name[name]] if facts else inspect(sources[by_name[name]]) for name in rig.names)
     check_sizes(ordered, rig, [fact.size for fact in ordered_facts])
-    _check_exposures(ordered, ordered_facts)
-    _check_overlap(ordered, ordered_facts)
+    check_exposures(ordered, ordered_facts)
+    check_overlap(ordered, ordered_facts)
     recording = Recording(ordered, ordered_facts, rig, fields_as, every, start, stop, lazy)
-    recording.events.extend(_notes(ordered, ordered_facts))
+    recording.events.extend(describe_fields(ordered, ordered_facts))
     return recording
-
-
-def _check_exposures(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> None:
-    """Raise VideoError where an image would be exposed for longer than the time to the next."""
-    for source, fact in zip(sources, facts, strict=True):
-        if source.exposure_s * fact.image_rate > 1:
-            raise VideoError(
-                f"{source.name}: exposure_s is {source.exposure_s:g}, but the next image follows after "
-                f"{float(1 / fact.image_rate):.4g} s; give the shutter's time in seconds (1/500 s is 0.002)"
-            )
-
-
-def _check_overlap(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> None:
-    """Raise VideoError where a camera has ended, by the files' durations, before all that follow begin."""
-    if any(fact.duration_s is None for fact in facts):
-        return
-    spans = [
-        (source.trial_time(Fraction(0)), source.trial_time(fact.duration_s or Fraction(0)), source.name)
-        for source, fact in zip(sources, facts, strict=True)
-    ]
-    spans.sort()
-    end_s = spans[0][1]
-    for begin_s, own_end_s, name in spans[1:]:
-        if begin_s >= end_s:
-            raise VideoError(
-                f"{name} begins at {float(begin_s):.3f} s, when the cameras before it ({spans[0][2]}, ...) ended at "
-                f"{float(end_s):.3f} s: no two overlap; correct offset_s"
-            )
-        end_s = max(end_s, own_end_s)
-
-
-def _notes(sources: Sequence[VideoSource], facts: Sequence[VideoFacts]) -> Iterator[str]:
-    for source, fact in zip(sources, facts, strict=True):
-        if source.fields == "auto":
-            yield f"{source.name}: the file's flags say {fact.flagged_order}"
-        elif fact.flagged_order != fact.fields:
-            advice = f'; if moving edges look like combs, write fields = "{fact.flagged_order}"'
-            is_whole = fact.fields == "progressive"
-            yield (
-                f"{source.name}: read as {fact.fields}, though the file's flags say {fact.flagged_order}"
-                f"{advice if is_whole else ''}"
-            )
 
 
 class _Cursor:

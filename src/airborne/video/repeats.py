@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -12,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airborne.video.decoding import DecodedImage
+from airborne.video.outages import N_LISTED
 from airborne.video.pixels import plane_rows
 
 _N_SAMPLES = 8_000  # chosen: of a picture that are compared, whatever its size
 _SHARE_BELOW = 0.998  # chosen: of the changes of its samples; a body covers a hundredth of a picture or less
-# chosen, and looked at on six synthetic throws and somersaults, in one with a picture repeated: from one picture to the
-# next the body changes its samples by 18 to 118 grey levels, a repeated and compressed one by up to 1
-_LEAST_GREY, _STILL = 16.0, 0.25  # change by which something moves; and share of that beside which is none
+# chosen on 30 recordings, nine of them with repeated pictures: from one picture to the next what moves changes its
+# samples by 5 to 139 grey levels and never stops within one, a repeated and compressed one by up to 1
+_MOVING_GREY, _REPEATED_GREY = 6.0, 1.0
 _FEWEST, _MOST_CHANGED = 10, 0.1  # chosen: pictures of a still video at least; share of them that compression changes
 
 
@@ -29,35 +31,40 @@ class PictureChanges:
     A video may be read again: pictures up to the last one that was added are known already.
     """
 
-    n_repeated: int = 0
+    _repeated: set[Fraction] = field(default_factory=set)  # times of the images that repeat the ones before [s]
     _frame: av.VideoFrame | None = None
     _samples: NDArray[np.uint8] | None = None
     _time_s: Fraction | None = None
-    _last: list[float] = field(default_factory=list)  # up to three changes [grey levels]
+    _change: float = 0.0  # from the picture before the last to the last [grey levels]
+    _is_repeated: bool = False  # the last
     _n: int = 0
     _n_changed: int = 0
 
-    def add(self, image: DecodedImage) -> Fraction | None:
-        """Add the next image; return the time of the picture before it where that repeats its own forerunner [s].
+    def add(self, image: DecodedImage) -> bool:
+        """Add the next image; say whether it repeats the one before.
 
-        It does where next to nothing changes from one to the other, but does before and after.
+        It does where next to nothing changes from one to the other, but did before, or was repeated then already.
         """
-        if image.frame is self._frame or (self._time_s is not None and image.time_s <= self._time_s):
-            return None
-        before, now, before_s = self._samples, _samples_of(image.frame), self._time_s
-        self._frame, self._samples, self._time_s = image.frame, now, image.time_s
+        if self._time_s is None or image.time_s > self._time_s:
+            if image.frame is not self._frame:
+                self._look_at(image.frame)
+            self._time_s = image.time_s
+            if self._is_repeated:
+                self._repeated.add(image.time_s)
+        return image.time_s in self._repeated
+
+    def _look_at(self, frame: av.VideoFrame) -> None:
+        before, now = self._samples, _samples_of(frame)
+        self._frame, self._samples = frame, now
         if before is None or now is None or before.shape != now.shape:
-            self._last = []
-            return None
+            self._change, self._is_repeated = 0.0, False
+            return
         changes = cv2.absdiff(now, before).ravel()
         counts = np.bincount(changes, minlength=256).cumsum()
         change = float(counts.searchsorted(int(_SHARE_BELOW * (len(changes) - 1)), side="right"))
-        self._last = [*self._last[-2:], change]
+        was_moving = self._is_repeated or self._change >= _MOVING_GREY
+        self._change, self._is_repeated = change, was_moving and change <= _REPEATED_GREY
         self._n, self._n_changed = self._n + 1, self._n_changed + (change > 0)
-        least = min(self._last[0], change)
-        is_repeated = len(self._last) == 3 and least >= _LEAST_GREY and self._last[1] < _STILL * least
-        self.n_repeated += is_repeated
-        return before_s if is_repeated else None
 
     @property
     def is_still(self) -> bool:
@@ -75,9 +82,18 @@ def _samples_of(frame: av.VideoFrame) -> NDArray[np.uint8] | None:
     return np.ascontiguousarray(rows[::every, ::every])
 
 
-def describe_repeat(name: str, frame: int, time_s: Fraction) -> str:
-    """Say which frame of a camera repeats the one before, and what that means."""
-    return (
-        f"{name}: frame {frame} ({float(time_s):.3f} s) repeats the picture before it: if the camera filmed on, its "
-        "pictures are late from there; take the repeated one out of the video"
-    )
+def describe_repeats(repeats: Mapping[str, Sequence[tuple[int, int]]]) -> Iterator[str]:
+    """Say which frames repeat the picture before them, by camera: runs of them from the first to the last."""
+    cameras: dict[tuple[tuple[int, int], ...], list[str]] = {}
+    for name, runs in repeats.items():
+        cameras.setdefault(tuple(runs), []).append(name)
+    for runs, names in cameras.items():
+        listed = [f"{first}" if first == last else f"{first} to {last}" for first, last in runs[:N_LISTED]]
+        more = f" and {len(runs) - N_LISTED} times more" if len(runs) > N_LISTED else ""
+        is_one = len(runs) == 1 and runs[0][0] == runs[0][1]
+        repeats_it = "repeats the picture before it and is" if is_one else "repeat the picture before them and are"
+        yield (
+            f"{', '.join(names)}: frame{'' if is_one else 's'} {', '.join(listed)}{more} {repeats_it} left out; if the "
+            f"camera{'s' if len(names) > 1 else ''} filmed on, later pictures are late: take the repeated ones out of "
+            f"the video{'s' if len(names) > 1 else ''}"
+        )

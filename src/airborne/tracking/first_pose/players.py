@@ -136,7 +136,10 @@ def find_players(
             f"[start] is missing, and no player is seen to stand {where}, whose middle must be the world's origin, x "
             "along the net; give [[start.player]] tables"
         )
-    return max(complete, key=lambda finding: (finding.is_decided, finding.candidates[0].probability))
+    decided = [finding for finding in complete if finding.is_decided]
+    if decided:  # from the earliest most of the recording can be followed: after a jump players stand as well as before
+        return min(decided, key=lambda finding: finding.frames.index)
+    return max(complete, key=lambda finding: finding.candidates[0].probability)
 
 
 def probability_right(state: Array, way_m: float, evidence: float) -> float:
