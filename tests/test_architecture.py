@@ -3,6 +3,7 @@
 import ast
 import functools
 import io
+import re
 import subprocess
 import sys
 import tokenize
@@ -265,3 +266,24 @@ def test_a_run_without_pictures_loads_no_library_of_figures_or_labelled_tables()
     code = f"import sys, airborne.run.track, airborne.trial.file; print(*({{*sys.modules}} & {{*{heavy}}}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_the_page_of_the_architecture_names_places_that_are_there():
+    """Whoever adds something is sent to files, functions and tables: none may have gone."""
+    text = (SOURCE.parents[1] / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
+    rows = [line for line in text.partition("## Where to put")[2].splitlines() if line.startswith("| ")][2:]
+    code = "\n".join(path.read_text(encoding="utf-8") for path in SOURCE.rglob("*.py"))
+    assert len(rows) > 30
+    for row in rows:
+        folders = [SOURCE, SOURCE.parents[1]]
+        for name in re.findall(r"`([^`]+)`", row):
+            if "/" in name or "." in name.strip("."):
+                places = [folder / name for folder in folders]
+                found = next((place for place in places if place.exists()), None)
+                is_of_run = name.endswith(".csv") or name == "trial.toml"  # not a file of the code
+                assert found or is_of_run, (
+                    f"docs/explanation/architecture.md sends to {name}, which is not there: {row}"
+                )
+                folders += [] if found is None else [found.parent, found]
+            else:
+                assert re.search(rf"\b{re.escape(name.strip('[]'))}\b", code), f"no code has {name}: {row}"

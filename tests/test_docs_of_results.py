@@ -16,6 +16,7 @@ from airborne.export.figures import write_figures
 from airborne.motion import covariance_file, flight_summary, measure_flight
 from airborne.motion.files import _header
 from airborne.motion.frame_file import FRAME_SD_FILE
+from airborne.motion.jumps.table import JUMP_COLUMNS
 from airborne.motion.run_folder import SMOOTH_JOINTS, SMOOTH_RECORD, TABLES, TRACKED_MOTION, figures_of
 from airborne.run import smooth
 from airborne.run.body_tables import write_tables
@@ -71,6 +72,15 @@ def test_every_column_is_documented(run, name):
     with next(run.rglob(name)).open(encoding="utf-8") as file:
         header = next(csv.reader(file))
     assert header == [column for row in table_of(RESULTS, f"`{name}`") for column in named(row[0])]
+
+
+def test_every_column_of_the_jumps_is_documented():
+    page = DOCS / "explanation" / "jumps.md"
+    rows = [*table_of(page, "Four heights that are not the same"), *table_of(page, "Columns")]
+    documented = {name for row in rows for name in named(row[0])}
+    plain = {name for name in JUMP_COLUMNS if not name.endswith(("_low", "_high"))}
+    assert plain - documented == set(), "add them to the tables of docs/explanation/jumps.md"
+    assert documented - plain == set(), "docs/explanation/jumps.md has columns that jumps.csv has not"
 
 
 def test_every_column_of_the_motion_is_documented():

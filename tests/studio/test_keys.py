@@ -75,7 +75,8 @@ def test_delete_removes_the_chosen_click_and_ctrl_enter_presses_the_blue_button(
         page.get_by_text("Use this person").wait_for()
         page.locator("h1").click()
         page.keyboard.press("Control+Enter")  # of several cards none
-        page.get_by_label("stature [m]").fill("1.91")
+        page.get_by_label("stature [m]").fill("")
+        page.get_by_label("stature [m]").press_sequentially("1,91")  # a decimal comma
         page.get_by_label("stature [m]").press("Control+Enter")
         page.get_by_text("the body is written into the trial").wait_for()
     body = read_toml(trial)["body"]

@@ -304,13 +304,15 @@ def test_start_that_needs_the_body_gives_no_pose_by_itself(folder):
 
 
 def test_person_can_be_asked_for_by_stature_and_mass_or_by_measurements(folder):
-    preset = read(
-        folder, GOOD.replace('file = "body.toml"', 'preset = "human18"\nstature_m = 1.7\nmass_kg = 60')
-    ).model()
+    by_stature = read(folder, GOOD.replace('file = "body.toml"', 'preset = "human18"\nstature_m = 1.7\nmass_kg = 60'))
+    preset = by_stature.model()
+    assert by_stature.body.is_preset
     assert len(preset.segments) == 18
     assert preset.needs_colours
     write_measurements(folder / "person.txt", measurements_of(1.7, 60.0))
-    measured = read(folder, GOOD.replace('file = "body.toml"', 'measurements = "person.txt"')).model()
+    by_measurements = read(folder, GOOD.replace('file = "body.toml"', 'measurements = "person.txt"'))
+    measured = by_measurements.model()
+    assert not by_measurements.body.is_preset
     for one, other in zip(preset.segments, measured.segments, strict=True):
         np.testing.assert_allclose(one.joint_m, other.joint_m, atol=1e-6)
     assert measured.needs_colours

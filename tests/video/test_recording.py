@@ -9,7 +9,7 @@ import pytest
 from airborne.cameras import Rig
 from airborne.video import Recording, VideoSource, open_recording
 from airborne.video import recording as recording_module
-from airborne.video.recording import _notes
+from airborne.video.checks import describe_fields
 from airborne.video.undistortion import undistortion_of
 from tests.support.clips import SIZE, numbered, numbers_of, packets_of, plain_rig, textured, with_noise, write_clip
 
@@ -185,7 +185,7 @@ def test_other_field_orders_than_the_files_flags_are_an_event_not_an_error(tmp_p
         "read as progressive, though the file's flags say bottom-first; if moving edges look like combs, write fields ="
     )
     order = replace(trial.facts[0], fields="progressive", flagged_order="bottom-first")
-    assert f'cam1: {combs} "bottom-first"' in list(_notes(trial.sources, (order,)))
+    assert f'cam1: {combs} "bottom-first"' in list(describe_fields(trial.sources, (order,)))
     assert open_recording([VideoSource("cam1", path, "auto")], plain_rig("cam1")).events == [
         "cam1: the file's flags say progressive"
     ]

@@ -18,7 +18,8 @@ from airborne.motion.players import PlayersMotion
 
 _METRES = {"units": "m", "frame": "world"}
 _SD = {"units": "m", "of": "root mean square of the three axes"}
-_UNITS = {"_m_s": "m/s", "_m": "m", "_s": "s", "_frame": "frames"}  # by the end of a name; the longest first
+# by the end of a name, the longest first; counts begin with n_
+_UNITS = {"_m_s": "m/s", "_m": "m", "_s": "s", "_deg": "deg", "_frame": "frames", "_scale": "1"}
 _TEXTS = ("status", "standing_source")
 
 
@@ -135,6 +136,8 @@ def _attributes(name: str) -> dict[str, str]:
     if name in _TEXTS:
         return {}
     stem = name.removesuffix("_low").removesuffix("_high")
-    unit = next((unit for end, unit in _UNITS.items() if stem.endswith(end)), "1")
+    unit = "1" if stem.startswith("n_") else next((unit for end, unit in _UNITS.items() if stem.endswith(end)), None)
+    if unit is None:
+        raise ValueError(f"column {name} of jumps.csv ends in no unit; name it with one of {', '.join(_UNITS)}")
     bound = {"_low": "2.5 %", "_high": "97.5 %"}.get(name.removeprefix(stem))
     return {"units": unit} | ({} if bound is None else {"quantile": bound})

@@ -137,7 +137,7 @@ class BodyRun:
         """
         from airborne.run.preset_shape import fit_preset_shape
 
-        if self.trial.body.preset is None:
+        if not self.trial.body.is_preset:
             return self
         args = self.trial, self.model, self.recording, self.start
         fitted = fit_preset_shape(*args, first=self.first, at_first=first)
@@ -218,7 +218,7 @@ class BodyRun:
         """Check the run, fit it and write the tables; return the motion and the beginning of the summary."""
         sort_rows(folder / self.table)
         motion, model, rig, begun_s = read_motion(folder / self.table), self.model, self.recording.rig, time.monotonic()
-        checked = check_run(motion, model, rig, self.kept, is_preset=self.trial.body.file is None, first=self.first)
+        checked = check_run(motion, model, rig, self.kept, is_preset=self.trial.body.is_preset, first=self.first)
         fitted, timings_s = None, {"self_check": time.monotonic() - begun_s}
         if self._fits_whole_run:
             fitted = self._fit_whole_run(folder, checked.motion, progress_of("fitting the whole run"))

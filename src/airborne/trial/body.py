@@ -52,6 +52,11 @@ class BodyTable(SettingsTable):
         return [*doubt_build(self.stature_m, self.mass_kg), *doubt_mass(model)]
 
     @property
+    def is_preset(self) -> bool:
+        """Whether its proportions are an average person's, not measured or drawn."""
+        return self.preset is not None
+
+    @property
     def source_file(self) -> str | None:
         """The file that defines the body, if there is one."""
         return self.file or self.measurements

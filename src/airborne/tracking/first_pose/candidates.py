@@ -1,4 +1,4 @@
-"""StartSearch a thing: the moments in which it is seen best, its candidate poses there, and a decision."""
+"""Where a thing may be: the moments in which it is seen best, its candidate poses there, and a decision."""
 
 from __future__ import annotations
 

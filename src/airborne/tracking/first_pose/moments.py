@@ -9,6 +9,9 @@ import numpy as np
 from scipy.special import expit
 
 from airborne.appearance.empty_scene import FEWEST_PICTURES, EmptyScene, estimate_empty_scene
+from airborne.appearance.model import Region
+from airborne.body import PosedBody, SurfaceArrays
+from airborne.tracking.image_regions import crop_regions
 from airborne.types import Array32
 from airborne.video import Frames, View
 from airborne.video.small import shrink
@@ -29,6 +32,20 @@ class Moment:
     def probability(self) -> tuple[Array32 | None, ...]:
         """Each pixel's probability (h, w) to show what is not in the empty scene, at even odds."""
         return tuple(None if nats is None else np.asarray(expit(nats), np.float32) for nats in self.evidence)
+
+
+def crop_probability(
+    moment: Moment, bodies: Sequence[PosedBody], geometry: SurfaceArrays, margin_px: int
+) -> tuple[list[Region], list[Array32]]:
+    """Cut out what holds the posed bodies in every view; return the regions and the probabilities in them."""
+    seen = {
+        source_of(view): plane
+        for view, plane in zip(moment.frames.views, moment.probability, strict=True)
+        if view is not None and plane is not None
+    }
+    regions = crop_regions(bodies, geometry, moment.frames, margin_px)
+    regions = [region for region in regions if region.source in seen]
+    return regions, [np.ascontiguousarray(region.crop(seen[region.source])) for region in regions]
 
 
 def spread_sample(recording: Iterable[Frames], n_expected: int | None) -> list[Frames]:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.special import ndtri
 
-from airborne.appearance.model import Region
 from airborne.body import BodyModel, Pose
 from airborne.body.chain import clamp_angles, clamp_to_limits, joint_angles_of
 from airborne.body.limits import JointLimits
@@ -23,15 +22,14 @@ from airborne.geometry.sampling import sobol_points
 from airborne.rendering import mask_evidence, mask_out_surface
 from airborne.rendering.threads import in_threads
 from airborne.tracking.first_pose.colour_information import PixelColours, colour_classes
-from airborne.tracking.first_pose.moments import Moment
+from airborne.tracking.first_pose.moments import Moment, crop_probability
 from airborne.tracking.first_pose.person import THREADS, JointedBody, Limb, PoseSet, SilhouetteEvidence, apart
 from airborne.tracking.first_pose.places import Place
 from airborne.tracking.first_pose.postures import library, limb_postures
-from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior, all_joints
 from airborne.tracking.model_based.gauss_newton import Posteriors, PyramidLevels, fit_silhouettes
 from airborne.tracking.model_based.left_right_swap import swap_limbs
-from airborne.types import Array, Array32
+from airborne.types import Array
 
 _N_ORIENTATIONS = 300  # about 20 degrees from any orientation to the nearest
 _BLUR_M, _LIMB_BLUR_M = 0.11, 0.06  # of the evidence: for postures, and for their limbs
@@ -261,7 +259,7 @@ def _swap(person: JointedBody, poses: PoseSet) -> PoseSet:
 
 def _fit(person: JointedBody, moment: Moment, poses: PoseSet, levels: PyramidLevels) -> PoseSet:
     """Fit everything to the silhouettes."""
-    masks = Posteriors(*_regions(person, moment, poses))
+    masks = Posteriors(*crop_probability(moment, person.bodies(poses), person.render_model.geometry, _MARGIN_PX))
     dofs, sd = all_joints(person.model), np.full(person.model.n_dofs, _FIT_SD)
 
     def fit(pose: Pose) -> Pose:
@@ -269,15 +267,3 @@ def _fit(person: JointedBody, moment: Moment, poses: PoseSet, levels: PyramidLev
         return fit_silhouettes(person.render_model, pose, masks, levels=levels, dofs=dofs, prior=prior)
 
     return PoseSet.of([fit(pose) for pose in poses.each()])
-
-
-def _regions(person: JointedBody, moment: Moment, poses: PoseSet) -> tuple[list[Region], list[Array32]]:
-    """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
-    seen = {
-        (view.camera.name, view.camera.K.tobytes()): plane
-        for view, plane in zip(moment.frames.views, moment.probability, strict=True)
-        if view is not None and plane is not None
-    }
-    regions = crop_regions(person.bodies(poses), person.render_model.geometry, moment.frames, _MARGIN_PX)
-    regions = [region for region in regions if region.source in seen]
-    return regions, [np.ascontiguousarray(region.crop(seen[region.source])) for region in regions]

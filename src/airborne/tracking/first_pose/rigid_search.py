@@ -1,4 +1,4 @@
-"""StartSearch a thing: all orientations at the places where something moves, scored by silhouettes, the best fitted."""
+"""Search for a thing: all orientations at the places where something moves, scored by silhouettes, the best fitted."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 from scipy.special import ndtri
 
-from airborne.appearance.model import Region
 from airborne.body import BodyModel, Pose, SurfaceArrays
 from airborne.body.symmetry import continuous_axes, symmetries
 from airborne.geometry.rotations import super_fibonacci
 from airborne.geometry.sampling import sobol_points
 from airborne.rendering import FLAT, EvidenceMaps, ScoreRule, evidence_maps, mask_evidence, pack_targets, score
-from airborne.tracking.first_pose.moments import Moment
+from airborne.tracking.first_pose.moments import Moment, crop_probability
 from airborne.tracking.first_pose.places import Place
-from airborne.tracking.image_regions import bounding_points, crop_regions
+from airborne.tracking.image_regions import bounding_points
 from airborne.tracking.model_based.degrees_of_freedom import root_only
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter
@@ -130,7 +129,9 @@ def log_likelihoods(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> Arra
 
 def _fit(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> list[Pose]:
     """Fit poses to the silhouettes."""
-    masks, dofs = Posteriors(*candidate_regions(thing, moment, poses)), root_only(thing.model)
+    bodies = [thing.render_model.with_pose(pose) for pose in poses]
+    masks = Posteriors(*crop_probability(moment, bodies, thing.render_model.geometry, _MARGIN_PX))
+    dofs = root_only(thing.model)
     return [fit_silhouettes(thing.render_model, pose, masks, levels=_LEVELS, dofs=dofs) for pose in poses]
 
 
@@ -151,19 +152,6 @@ def roots_of(poses: Sequence[Pose]) -> tuple[Array, Array]:
     """Return the poses' rotations (n, 3, 3) and positions (n, 3) [m]."""
     roots = [pose.world_from_root for pose in poses]
     return np.stack([root.rotation.as_matrix() for root in roots]), np.stack([root.translation for root in roots])
-
-
-def candidate_regions(thing: Thing, moment: Moment, poses: Sequence[Pose]) -> tuple[list[Region], list[Array32]]:
-    """Cut out what holds the poses in every view; return the regions and the probabilities in them."""
-    bodies = [thing.render_model.with_pose(pose) for pose in poses]
-    seen = {
-        (view.camera.name, view.camera.K.tobytes()): plane
-        for view, plane in zip(moment.frames.views, moment.probability, strict=True)
-        if view is not None and plane is not None
-    }
-    regions = crop_regions(bodies, thing.render_model.geometry, moment.frames, _MARGIN_PX)
-    regions = [region for region in regions if region.source in seen]
-    return regions, [np.ascontiguousarray(region.crop(seen[region.source])) for region in regions]
 
 
 def full_maps(moment: Moment, planes: Sequence[Array32 | None]) -> EvidenceMaps:
