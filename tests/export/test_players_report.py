@@ -49,7 +49,7 @@ def test_a_height_that_nobody_saw_is_unknown_and_it_is_said_why(tmp_path):
     row = {**jump_row(jump), "hip_height_m": np.nan}
     _, first, _, note = players_summary(summary_of([row]))
     assert first == f"one, jump 1: {UNKNOWN_TEXT}, hips over standing (95 % interval)"
-    why = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
+    why = "a peak needs five known frames around it, in each of which two cameras or more see the tracked player"
     assert note == f"  how high the hips rose is not known: {why}"
     page = write_players_report(tmp_path, summary_of([row]), motion).read_text()
     assert f"<b>{UNKNOWN_TEXT}</b>" in page and f"one, jump 1: how high the hips rose is not known: {why}</li>" in page
@@ -61,7 +61,7 @@ def test_uncertain_ankles_do_not_speak_against_the_height_of_hips_that_are_track
     (of_ankles,) = jump_notes({**row, "n_uncertain": 26})
     assert of_ankles.startswith("knees or ankles are uncertain in 26 of its frames, hips in none")
     (of_hips,) = jump_notes({**row, "n_uncertain": 26, "n_hips_uncertain": 3})
-    assert of_hips == "hips are uncertain in 3 of its frames: look at them before use"
+    assert of_hips == "hips are uncertain in 3 of its frames: check them before use"
 
 
 def test_standing_that_was_not_seen_is_said_with_what_to_film():
@@ -90,7 +90,7 @@ def test_what_speaks_against_a_run_is_said_beside_its_numbers_and_in_the_same_wo
     few = {"n_below_two_cameras": 90, "n_fewer_cameras": 90, "doubts": doubts}
     summary["players"] = {"one": {**COUNTS, "n_tracked": 0, "n_uncertain": 150, **few}}
     _, uncertain, few, untracked, unseen, _, _, noisy = players_summary(summary)
-    assert uncertain == "  uncertain are all joints in frames 0 to 149: sd over 6 cm; look at them before use"
+    assert uncertain == "  uncertain: all joints in frames 0 to 149: sd over 6 cm; check them before use"
     assert few == "  90 of 150 frames rest on fewer than two cameras, so that depth is a guess"
     assert untracked.startswith("  no frame was tracked, so none of these numbers can be relied on: are the joints of ")
     assert unseen.startswith("  in most frames fewer than two cameras agree: are videos exchanged")

@@ -80,7 +80,7 @@ def test_the_summary_counts_each_player_and_names_the_inputs(path, tmp_path):
     }
     assert summary["players"]["number 7"]["n_uncertain"] == 3
     (doubt,) = summary["players"]["number 7"]["doubts"]
-    said = f"number 7: uncertain are {doubt}; look at them before use"
+    said = f"number 7: uncertain: {doubt}; check them before use"
     assert said in summary["warnings"]
     assert _describe(summary, tmp_path / "run").count(doubt) == 1
     assert summary["bystanders"] == [BYSTANDER]
@@ -103,7 +103,7 @@ def test_videos_and_report_are_written_on_request(path, tmp_path):
     track_trial(read_trial(path, {"overlay": "broadcast"}), tmp_path / "run")
     assert set(files_of(tmp_path / "run")) == TABLES | PICTURES
     report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
-    assert "number 7: uncertain are all joints in " in report
+    assert "number 7: uncertain: all joints in " in report
     assert report.count("<img") == 1 and "http:" not in report.split("<style>")[0]
 
 
@@ -174,7 +174,8 @@ def test_of_a_player_who_starts_in_the_air_no_frame_is_tracked(path, tmp_path):
     path.with_name("raised.toml").write_text(raised)
     summary = track_trial(read_trial(path.with_name("raised.toml")), tmp_path / "run", pictures=False).summary
     assert [player["n_tracked"] for player in summary["players"].values()] == [0, 9]
-    assert any(each.startswith("player 'Anna': both ankles lie 0.40 m or more over") for each in summary["events"])
+    assert summary["players"]["Anna"]["start_doubt"].startswith("both ankles lie 0.40 m or more over")
+    assert any(each.startswith("Anna: both ankles lie 0.40 m or more over") for each in summary["warnings"])
 
 
 def test_a_start_past_the_end_is_refused(tmp_path):

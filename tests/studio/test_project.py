@@ -75,7 +75,7 @@ def test_a_run_is_ready_once_it_is_finished(tmp_path):
     )
     assert track_step() == (
         "needs you",
-        "results is of another [body] than now; track again",
+        "the body has changed since results was tracked; track again",
     )
     after = {step.name: (step.state, step.says) for step in steps(read_project(folder, folder / "trial.toml"))}
     assert after["Review"] == ("empty", "results (before the change)")

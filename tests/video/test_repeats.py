@@ -1,6 +1,7 @@
 """A picture that repeats the one before is named with its frame, and a video of one picture as a still one."""
 
 from contextlib import closing
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -57,6 +58,24 @@ def test_of_a_thing_that_moves_or_comes_to_rest_nothing_is_said(tmp_path):
     at_rest = [np.tile((90 + 130 * share)[None, :, None], (48, 1, 3)).astype(np.uint8) for share in shares]
     _, said_at_rest = read(tmp_path, at_rest, codec="ffv1")  # which loses nothing
     assert (said, said_at_rest) == ([], [])
+
+
+def test_a_reading_that_goes_on_from_between_two_fields_of_a_picture_sees_no_repeat(tmp_path):
+    for name in "ab":
+        write_clip(tmp_path / f"{name}.mkv", moving(), codec="libx264", pix_fmt="yuv420p")
+    sources = [VideoSource(name, tmp_path / f"{name}.mkv", "top-first") for name in "ab"]
+    recording = open_recording(sources, plain_rig("a", "b"))
+    for n in (5, 8, 11, 2 * N):
+        with closing(iter(recording)) as frames:
+            seen = list(islice(frames, n))
+        assert len(seen) == n
+        assert all(view is not None for frames in seen for view in frames.views)
+
+
+def test_of_a_flash_a_cut_and_a_dark_picture_nothing_is_said(tmp_path):
+    still, dark, bright = (np.full((48, 64, 3), level, np.uint8) for level in (90, 0, 250))
+    _, said = read(tmp_path, [still, still, dark, dark, dark, still, still, bright, still, still, *moving()[:4]])
+    assert said == []
 
 
 def test_a_video_of_one_picture_is_named(tmp_path):

@@ -13,9 +13,9 @@ from airborne.motion.jumps.jump import are_legs_lost, is_no_fall
 from airborne.motion.jumps.standing_posture import NEAR_S, WINDOW_S
 from airborne.motion.players_doubts import are_of_single_joints
 
-_PEAK_TAKES = "a peak takes five known frames around it, seen by two cameras or more, of a player who was tracked"
+_PEAK_TAKES = "a peak needs five known frames around it, in each of which two cameras or more see the tracked player"
 
-_EVENT_TAKES = "each takes frames of contact beside it, and close to it a tracked ankle"
+_EVENT_TAKES = "each needs frames with a foot on the floor beside it, and a tracked ankle close to it"
 _UNKNOWN_EVENTS = {"no take-off": "take-off is", "no landing": "landing is", "neither": "take-off and landing are"}
 
 
@@ -48,9 +48,9 @@ def player_notes(player: Mapping[str, Any], summary: Mapping[str, Any]) -> Itera
     if player["n_lost"]:
         yield describe_lost(player["n_lost"], n)
     if doubts := player.get("doubts"):
-        yield f"uncertain are {'; '.join(doubts)}; look at them before use"
+        yield f"uncertain: {'; '.join(doubts)}; check them before use"
     elif player["n_uncertain"]:
-        yield f"{count_of(player['n_uncertain'], n, 'frame')} uncertain; look at them before use"
+        yield f"{count_of(player['n_uncertain'], n, 'frame')} uncertain; check them before use"
     if few := player["n_below_two_cameras"]:
         rest = "rests" if few == 1 else "rest"
         yield f"{few} of {n} frames {rest} on fewer than two cameras, so that depth is a guess"
@@ -94,7 +94,7 @@ def jump_notes(jump: Mapping[str, Any]) -> Iterator[str]:
         )
     n, n_hips = jump["n_uncertain"], jump.get("n_hips_uncertain", jump["n_uncertain"])
     if n_hips:
-        yield f"hips are uncertain in {n_hips} of its frames: look at them before use"
+        yield f"hips are uncertain in {n_hips} of its frames: check them before use"
     elif n:
         yield f"knees or ankles are uncertain in {n} of its frames, hips in none: prefer the height of the hips"
 

@@ -158,6 +158,15 @@ def _has_frame(run: Path) -> bool:
     return False
 
 
+_TABLES = {  # of a trial, in words
+    "[start]": "the first pose",
+    "[lights]": "the lights",
+    "[calibration]": "the calibration",
+    "[body]": "the body",
+    "[[camera]]": "the videos",
+}
+
+
 @dataclass(frozen=True, slots=True)
 class StudioStep:
     """One step on the way, and what is to be done there."""
@@ -215,7 +224,7 @@ def _body_state(project: Project) -> tuple[StepState, str]:
     if file and not (project.folder / str(file)).is_file():
         return "needs you", f"{file} not found"
     if what := file or body.get("preset"):
-        return "ready", str(what)
+        return "ready", "players" if what == "legs" else str(what)
     return ("needs you" if project.cameras else "empty"), "choose what is tracked"
 
 
@@ -225,13 +234,15 @@ def _start_state(project: Project) -> tuple[StepState, str]:
         return "ready", f"frame {start.get('frame', 0)}"
     if not project.table("body") or not project.table("calibration"):
         return "empty", "where the body is"
-    return "needs you", "where is the body?"
+    return "needs you", "where are the players?" if project.table("body").get(
+        "preset"
+    ) == "legs" else "where is the body?"
 
 
 def _find_changed_tables(project: Project, run: Path) -> list[str]:
-    """Return which of the trial's tables have changed since a run; none where they cannot be read."""
+    """Name which of the trial's tables have changed since a run; none where they cannot be read."""
     try:
-        return find_changed_tables(project.trial(), run)
+        return [_TABLES[table] for table in find_changed_tables(project.trial(), run)]
     except AirborneError:
         return []
 
@@ -242,7 +253,8 @@ def _run_steps(project: Project) -> Iterator[StudioStep]:
     finished, says = [run for run in runs if (run / SUMMARY).is_file()], ""
     changed = _find_changed_tables(project, finished[0]) if finished else []
     if changed:
-        says = f"{finished[0].name} is of another {' and '.join(changed)} than now; track again"
+        have = "has" if len(changed) == 1 and not changed[0].endswith("s") else "have"
+        says = f"{' and '.join(changed)} {have} changed since {finished[0].name} was tracked; track again"
         yield StudioStep("Track", "/track", "needs you", says)
     elif finished:
         yield StudioStep("Track", "/track", "ready", finished[0].name)

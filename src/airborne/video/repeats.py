@@ -35,7 +35,7 @@ class PictureChanges:
     _frame: av.VideoFrame | None = None
     _samples: NDArray[np.uint8] | None = None
     _time_s: Fraction | None = None
-    _change: float = 0.0  # from the picture before the last to the last [grey levels]
+    _is_moving: bool = False  # whether something moved from the picture before the last to the last
     _is_repeated: bool = False  # the last
     _n: int = 0
     _n_changed: int = 0
@@ -46,24 +46,29 @@ class PictureChanges:
         It does where next to nothing changes from one to the other, but did before, or was repeated then already.
         """
         if self._time_s is None or image.time_s > self._time_s:
-            if image.frame is not self._frame:
+            if not self._is_last(image.frame):
                 self._look_at(image.frame)
             self._time_s = image.time_s
             if self._is_repeated:
                 self._repeated.add(image.time_s)
         return image.time_s in self._repeated
 
+    def _is_last(self, frame: av.VideoFrame) -> bool:
+        """Whether it is the picture looked at last, of which this is the other field; also in another reading."""
+        last = self._frame
+        return last is not None and (frame is last or (frame.pts is not None and frame.pts == last.pts))
+
     def _look_at(self, frame: av.VideoFrame) -> None:
         before, now = self._samples, _samples_of(frame)
         self._frame, self._samples = frame, now
         if before is None or now is None or before.shape != now.shape:
-            self._change, self._is_repeated = 0.0, False
+            self._is_moving = self._is_repeated = False
             return
         changes = cv2.absdiff(now, before).ravel()
         counts = np.bincount(changes, minlength=256).cumsum()
-        change = float(counts.searchsorted(int(_SHARE_BELOW * (len(changes) - 1)), side="right"))
-        was_moving = self._is_repeated or self._change >= _MOVING_GREY
-        self._change, self._is_repeated = change, was_moving and change <= _REPEATED_GREY
+        usual, change = (int(counts.searchsorted(int(q * (len(changes) - 1)), "right")) for q in (0.5, _SHARE_BELOW))
+        self._is_repeated = change <= _REPEATED_GREY and (self._is_moving or self._is_repeated)
+        self._is_moving = change >= _MOVING_GREY > usual  # where most changes it is a flash, a cut, or goes dark
         self._n, self._n_changed = self._n + 1, self._n_changed + (change > 0)
 
     @property

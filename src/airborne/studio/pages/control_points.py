@@ -180,8 +180,8 @@ class ControlPointsPanel(PointsPanel):
             n = count_clicked(self.clicked, camera)
             if isinstance(fit, Calibration):
                 own = fit.fits[0]
-                residual = f"residual {own.rms_px:.2f} px RMS, {own.held_out_rms_px[own.model]:.2f} of points left out"
-                text, model = f"{n} points, {residual}", own.model
+                left_out = f"{own.held_out_rms_px[own.model]:.2f} px where each is predicted from the others"
+                text, model = f"{n} points; residual {own.rms_px:.2f} px RMS, {left_out}", own.model
                 tone = "warn" if self._findings(camera) else "soft"
             elif fit:
                 text, tone = fit, "bad"

@@ -26,7 +26,9 @@ _NO_LANDMARKS = (
 async def first_pose_page(session: Session) -> None:
     """Let the user find or click the pose at one frame, and write it into the trial."""
     project = session.project()
-    async with page_frame(session, "First pose", "Where is the body at the start?", _HELP) as changed:
+    are_players = project.table("body").get("preset") == "legs"
+    title = "Where are the players at the start?" if are_players else "Where is the body at the start?"
+    async with page_frame(session, "First pose", title, _HELP) as changed:
         if name_missing_steps(session, changed, "Videos", "Cameras", "Body"):
             return
         shown = await work("indexing the videos", session.shown)
@@ -35,7 +37,7 @@ async def first_pose_page(session: Session) -> None:
             return
         start = read_draft_start(session) or project.table("start")
         frame = int(start.get("frame", session.frame))
-        if project.table("body").get("preset") == "legs":
+        if are_players:
             players = PlayersPanel(session, shown, rig, frame)
             await _build_either(players, FindPlayersPanel(session, shown, rig, frame), changed)
             return

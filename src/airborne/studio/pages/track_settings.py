@@ -62,7 +62,8 @@ class TrackSettingsBar:
         self._method.set_value(track.method)
         self._last.set_value(min(self._n_images, track.stop or self._n_images) - 1)
         self._first.set_value(self._trial.first_frame)
-        whose = "where the body is looked for first" if self._trial.start.find else "the first pose's"
+        who = "the players are" if self._trial.has_players else "the body is"
+        whose = f"where {who} looked for first" if self._trial.start.find else "the first pose's"
         self._start.set_text(
             f"from frame {frame}, {whose}" + (", on and back" if self._trial.first_frame < frame else "")
         )
