@@ -85,10 +85,18 @@ def test_players_have_colours_by_their_side_of_the_net():
     assert player_colours({"b": 2.0})["b"] == colours["b"]
 
 
-def test_curves_of_players_are_of_what_is_lowest(tmp_path):
-    curves = run_curves(write_run(tmp_path / "run"))
-    assert curves["frame"] == list(range(12))
-    assert [each["name"].split(":")[0] for each in curves["series"]] == ["Anna", "number 7"]
+def test_curves_of_players_are_of_their_hips_or_of_what_is_lowest(tmp_path):
+    run = write_run(tmp_path / "run")
+    assert list(curve_kinds(run)) == ["", "feet"]
+    motion = read_players(run / "joints.csv")
+    for what, limbs in (("", ("hip_left", "hip_right")), ("feet", ("ankle_left", "ankle_right"))):
+        curves = run_curves(run, what)
+        assert curves["frame"] == list(range(12))
+        assert [each["name"].split(":")[0] for each in curves["series"]] == ["Anna", "number 7"]
+        height = motion.points[:, 0, [motion.joints.index(limb) for limb in limbs], 2]
+        first = curves["series"][0]
+        np.testing.assert_allclose(first["value"], height.min(axis=1) if what else height.mean(axis=1), atol=1e-5)
+        assert all(0 < sd < 0.2 for sd in first["sd"])
     assert set(curves["status"]) <= {"tracked", "uncertain", "lost"}
     assert [(strip["name"], len(strip["rank"])) for strip in curves["strips"]] == [("Anna", 12), ("number 7", 12)]
 

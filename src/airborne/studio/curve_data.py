@@ -19,6 +19,7 @@ from airborne.types import Array
 
 LIMBS = ("hip", "knee", "ankle", "foot")  # in order down a leg
 _MOST_POINTS = 4000  # of a curve: more than a screen has columns
+_FEET = "feet"  # of players: what curves show instead of their hips
 _JOINT = "joint:"  # before a joint's name, in what curves show
 _TABLES = {  # what curves show besides: the table, words, unit, columns and their names
     "rotation": (ANGLES, "rotation", "°", {f"{name}_deg": name for name in ("somersault", "tilt", "twist")}),
@@ -31,7 +32,7 @@ _OF_JOINT = (JOINT_ANGLES, "", "°", {f"{axis}_deg": axis for axis in "xyz"})
 def curve_kinds(run: Path) -> dict[str, str]:
     """Return what a run's curves can show: its name in an address, and in words."""
     if holds_players(run):
-        return {"": "how high the feet are"}
+        return {"": "how high the hips are", _FEET: "how high the feet are"}
     found = {"": "position", **{name: words for name, (file, words, *_) in _TABLES.items() if (run / file).is_file()}}
     limbs = run_body(run).segments[1:] if (run / JOINT_ANGLES).is_file() else ()
     return found | {f"{_JOINT}{limb.name}": limb.name.replace("_", " ") for limb in limbs}
@@ -49,8 +50,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
     if holds_players(run):
         motion = run_players(run)
         index, time_s, status = motion.index, motion.time_s, motion.status
-        names, values = _lower_legs(motion)
-        sd = np.empty((len(index), 0))
+        names, values, sd = _lower_legs(motion) if what == _FEET else _hips(motion)
     else:
         rows = run_rows(run)
         index, time_s, status = rows.index, rows.time_s, rows.status[:, None]
@@ -157,13 +157,28 @@ def _points(run: Path) -> tuple[NDArray[np.int64], dict[str, Array]]:
     return motion.index, {f"{motion.players[p]} {motion.joints[j]}": motion.points[:, p, j] for p, j in pairs}
 
 
-def _lower_legs(motion: PlayersMotion) -> tuple[Sequence[str], Array]:
-    """Return how high the lower of each player's legs is, and which joint of it: (n, players) [m]."""
-    limb = next((limb for limb in reversed(LIMBS) if {f"{limb}_left", f"{limb}_right"} <= set(motion.joints)), None)
-    if limb is None:
+def _hips(motion: PlayersMotion) -> tuple[Sequence[str], Array, Array]:
+    """Return how high the middle of each player's hips is, names, values and deviations (n, players) [m]."""
+    height, variance = _limb_heights(motion, "hip")
+    return [f"{name}: hips" for name in motion.players], height.mean(axis=2), np.sqrt(variance.mean(axis=2))
+
+
+def _lower_legs(motion: PlayersMotion) -> tuple[Sequence[str], Array, Array]:
+    """Return how high the lower of each player's legs is, and which joint of it, as `_hips` does."""
+    limb = next((limb for limb in reversed(LIMBS) if f"{limb}_left" in motion.joints), LIMBS[0])
+    height, variance = _limb_heights(motion, limb)
+    lower = np.argmin(np.where(np.isfinite(height), height, np.inf), axis=2)[..., None]
+    height, variance = (np.take_along_axis(each, lower, axis=2)[..., 0] for each in (height, variance))
+    return [f"{name}: lower {limb}" for name in motion.players], height, np.sqrt(variance)
+
+
+def _limb_heights(motion: PlayersMotion, limb: str) -> tuple[Array, Array]:
+    """Return heights and variances (n, players, 2) of a joint on both sides. Raises ResultError where it is missing."""
+    sides = [f"{limb}_{side}" for side in ("left", "right")]
+    if not set(sides) <= set(motion.joints):
         raise ResultError("the run holds no legs; track again")
-    lower = [motion.joints.index(f"{limb}_{side}") for side in ("left", "right")]
-    return [f"{name}: lower {limb}" for name in motion.players], np.min(motion.points[:, :, lower, 2], axis=2)
+    both = [motion.joints.index(side) for side in sides]
+    return motion.points[:, :, both, 2], motion.covariance[:, :, both, 2, 2]
 
 
 def _interleave(first: NDArray, second: NDArray) -> NDArray:
