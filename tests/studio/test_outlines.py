@@ -208,3 +208,14 @@ def test_rows_of_a_run_are_counted_while_it_goes_on(tmp_path):
             assert count_rows(tmp_path) == (number, estimate.index)
     path.write_bytes(path.read_bytes() + b"99,0.3")
     assert count_rows(tmp_path) == (number, estimate.index)
+
+
+def test_frames_of_players_are_counted_while_their_run_goes_on(tmp_path):
+    path = write_run(tmp_path / "run") / "joints.csv"
+    assert count_rows(path.parent) == (12, 11)
+    lines = path.read_text().splitlines(keepends=True)
+    per_frame = (len(lines) - 1) // 12
+    path.write_text("".join(lines[: 1 + 3 * per_frame]) + lines[1 + 3 * per_frame][:5])  # the last is being written
+    assert count_rows(path.parent) == (3, 2)
+    path.write_text(lines[0])
+    assert count_rows(path.parent) == (0, None)

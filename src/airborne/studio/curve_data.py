@@ -43,7 +43,7 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
 
     `what` is one of `curve_kinds`; raises ResultError for another. A strip is how a joint or a player went: a digit a
     frame, its place in `strips.FROM_GOOD`.
-    `is_provisional`: deviations grow once a run ends, with what all of its frames say of the cameras.
+    `is_provisional`: deviations of a body grow once its run ends, with what all of its frames say of the cameras.
     Of a long run several frames share a point: the least and the greatest of their values, the worst of their statuses.
     """
     unit = "m"
@@ -70,13 +70,13 @@ def run_curves(run: Path, what: str = "") -> dict[str, Any]:
         ranks = np.maximum.reduceat(ranks, starts).repeat(2, axis=0)
     return {
         "is_thinned": is_thinned,
-        "is_provisional": bool(sd.shape[1]) and not (run / SUMMARY).is_file(),
+        "is_provisional": not (holds_players(run) or (run / SUMMARY).is_file()),
         "frame": index.tolist(),
         "time_s": time_s.tolist(),
         "status": FROM_GOOD[worst].tolist(),
         "strips": [{"name": name, "rank": "".join(map(str, ranks[:, k]))} for k, name in enumerate(strips)],
         "series": [
-            {"name": name, "unit": unit, "value": _plain(values[:, k]), "sd": _plain(sd[:, k]) if sd.shape[1] else []}
+            {"name": name, "unit": unit, "value": _plain(values[:, k]), "sd": _plain(sd[:, k])}
             for k, name in enumerate(names)
         ],
     }

@@ -14,11 +14,12 @@ from airborne.cameras import Rig, read_rig
 from airborne.errors import ResultError, count
 from airborne.motion import PlayersMotion
 from airborne.motion.rows import MotionRows, read_rows
-from airborne.motion.run_folder import BODY, CALIBRATION, JOINTS, MOTION, RUN_RECORD, read_players_run
+from airborne.motion.run_folder import BODY, CALIBRATION, JOINTS, MOTION, RUN_RECORD, holds_players, read_players_run
 from airborne.studio.folder import file_stamp
 from airborne.trial.file import Trial
 
 _MOST_KEPT = 8  # runs
+_LONGEST_FRAME = 200_000  # chosen: bytes of a table that hold all joints of twenty players in a frame
 _rows: OrderedDict[Path, tuple[Any, MotionRows]] = OrderedDict()  # run -> stamp of its file, and what was read then
 _rows_lock = Lock()
 
@@ -37,12 +38,26 @@ def run_rows(run: Path) -> MotionRows:
 
 
 def count_rows(run: Path) -> tuple[int, int | None]:
-    """Return how many frames a run of one body holds so far, and which is the newest; none before it has begun."""
+    """Return how many frames a run holds so far, and which is the newest; none before it has begun."""
+    if holds_players(run):
+        return _count_players(run / JOINTS)
     try:
         rows = run_rows(run)
     except ResultError:
         return 0, None
     return len(rows), rows.newest
+
+
+def _count_players(path: Path) -> tuple[int, int | None]:
+    """Return what `count_rows` does of a table of players' joints, which has as many lines for each frame."""
+    try:
+        text = path.read_bytes()
+        _, *first = text[:_LONGEST_FRAME].split(b"\n")
+        frames = [line.split(b",", 2)[1] for line in first if line.count(b",") > 1]
+        _, _, last = text[: text.rindex(b"\n")].rpartition(b"\n")
+        return (text.count(b"\n") - 1) // frames.count(frames[0]), int(last.split(b",", 2)[1])
+    except (OSError, ValueError, IndexError):
+        return 0, None
 
 
 def run_body(run: Path) -> BodyModel:

@@ -128,7 +128,7 @@ class _Panel:
             command is not None
             and command.is_running
             and "--overwrite" in command.words
-            and not command.has_written(run / MOTION)
+            and not any(command.has_written(run / name) for name in (MOTION, JOINTS))
         ):
             return 0, None, False  # what is there is the run before
         return *count_rows(run), (run / SUMMARY).is_file()
