@@ -17,6 +17,7 @@ MEASURED = {  # rooms of src/airborne that the rows of a file measure; of other 
     "speed": ("appearance", "kernels", "rendering", "tracking", "video"),
     "calibration": ("calibration", "cameras"),
     "calibration_file": ("calibration", "cameras", "tracking"),
+    "few_points": ("calibration", "cameras"),
     "sync": ("sync", "video"),
     "jumps": ("motion/jumps", "synthetic/block", "tracking/capsules"),
     "find_start": ("appearance", "run", "tracking/first_pose"),

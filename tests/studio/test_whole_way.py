@@ -58,7 +58,7 @@ def click_control_points(user, folder):
         for pane in range(3):
             user.click_pixel(pane, points.px[row, pane])
         user.page.keyboard.press("n")
-    user.page.get_by_text("12 points, residual").nth(2).wait_for()
+    user.page.get_by_text("12 points; residual").nth(2).wait_for()
 
 
 def draw_docs(page):
