@@ -53,6 +53,29 @@ def test_repeated_pictures_are_named_with_their_share(every, share):
     assert found.value == pytest.approx(share, abs=0.03)
 
 
+@pytest.mark.parametrize("n_lost", [1, 2, 5])
+def test_images_lost_in_all_cameras_are_named_with_their_frame_and_time(n_lost):
+    smooth = thrown_path(0.1, 0.1)
+    poses = [*smooth.poses[:20], *smooth.poses[20 + n_lost :]]
+    n = len(poses)
+    found = find_wrong_path(TrackedPath(smooth.index[:n], smooth.time_s[:n], poses, smooth.covariance[:n]), np.ones(2))
+    assert found is not None and found.kind == "lost"
+    assert found.value == pytest.approx(n_lost * (smooth.time_s[1] - smooth.time_s[0]))
+    assert found.sentence.startswith(f"from frame 19 to the next the body moves and turns as in {n_lost + 1} frames")
+
+
+def test_of_frames_that_are_known_to_be_lost_nothing_is_said():
+    smooth = thrown_path(0.1, 0.1)
+    rows = np.array([i for i in range(N) if i not in (20, 21)])
+    poses = [smooth.poses[i] for i in rows]
+    assert (
+        find_wrong_path(
+            TrackedPath(smooth.index[rows], smooth.time_s[rows], poses, smooth.covariance[rows]), np.ones(2)
+        )
+        is None
+    )
+
+
 def test_a_thing_that_rests_or_bounces_repeats_nothing():
     smooth = thrown_path(0.1, 0.1)
     times, covariance = (smooth.index, smooth.time_s), smooth.covariance

@@ -28,9 +28,8 @@ class Measurement(NamedTuple):
 
 
 UNKNOWN = Measurement(np.nan, np.nan, np.nan)
-# of the variances: above it a flight is no fall as tracked. Chosen by what `blocker` has: right recordings 1 (32 jumps),
-# with a clock 0.1 s off 2, every tenth image lost in all cameras 3.9, at a wrong frame rate 8 to 11, with exchanged
-# videos 12
+# of the variances: above it a flight is no fall as tracked. Chosen by what `blocker` has: right recordings 1 (32 jumps
+# of them), a clock 0.1 s off 2, every tenth image lost in all cameras 3.9, a wrong frame rate 8 to 11, mixed videos 12
 _NOISY = 3.0
 # by which feet rise more than hips in a flight that is no fall. Chosen on synthetic blocks 41 to 44, whole and with a
 # camera moved, late or at a wrong frame rate, where it is at most 0.05; block_jump then has 0.05, with a camera moved
