@@ -17,12 +17,13 @@ from airborne.errors import format_digits
 from airborne.evaluation import Agreement, Series
 from airborne.evaluation.compare import or_dash
 from airborne.export import panels
+from airborne.export.palette import CYCLE, GREEN, PURPLE, VERMILION
 from airborne.io.figures import save_png
 from airborne.motion.smoothing import ResidualAnalysis
 from airborne.types import Array
 
-_CHOSEN, _OTHER = "#d55e00", "#333333"
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#333333")
+_CHOSEN, _OTHER = VERMILION, "#333333"
+_COLOURS = (*CYCLE, "#333333")
 
 
 def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | None = None) -> None:
@@ -42,8 +43,8 @@ def write_residuals(path: Path, analysis: ResidualAnalysis, used_hz: float | Non
         axes.set_ylim(0, max(4 * start, 1.2 * float(np.interp(f[-1] / 6, f, residual))))
     for hz, colour, style, label in (
         (analysis.chosen_hz, _CHOSEN, "-", "Winter"),
-        (analysis.whitest_hz, "#cc79a7", ":", "whitest residuals (Challis)"),
-        (used_hz, "#009e73", "-.", "used"),
+        (analysis.whitest_hz, PURPLE, ":", "whitest residuals (Challis)"),
+        (used_hz, GREEN, "-.", "used"),
     ):
         if hz is not None and np.isfinite(hz):
             axes.axvline(hz, color=colour, linestyle=style, linewidth=1.2, label=f"{label}: {hz:.1f} Hz")

@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from airborne.export import panels
-from airborne.export.palette import ESTIMATE_RGB, hex_colour
+from airborne.export.palette import ESTIMATE_RGB, VERMILION, hex_colour
 from airborne.export.pictures import encode_png
 from airborne.io.figures import save_png
 from airborne.types import Array, Image
 
-_LINE_STYLES = (("-", hex_colour(ESTIMATE_RGB)), ("--", "#d55e00"))
+_LINE_STYLES = (("-", hex_colour(ESTIMATE_RGB)), ("--", VERMILION))
 _TITLE_PX, _GAP_PX, _FONT_SCALE = 18, 2, 0.42  # of a title line, between pictures; of OpenCV's font
 _GREY = (210, 210, 210)  # sRGB of the text
 

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from airborne.body import BodyModel
 from airborne.errors import ResultError
 from airborne.export import panels
-from airborne.export.palette import STATUS_RGB, UNKNOWN_RGB, hex_colour
+from airborne.export.palette import BLUE, PURPLE, STATUS_RGB, UNKNOWN_RGB, hex_colour
 from airborne.io.figures import save_png
 from airborne.motion import (
     JointStatus,
@@ -28,7 +28,7 @@ from airborne.motion import (
 from airborne.motion.joints import doubtful_segments, main_joints
 from airborne.tracking import Status
 
-_AXIS_STYLES = (("x", "-", "#0072b2"), ("y", "--", "#cc79a7"), ("z", ":", "#333333"))
+_AXIS_STYLES = (("x", "-", BLUE), ("y", "--", PURPLE), ("z", ":", "#333333"))
 JOINT_COLOURS = {
     JointStatus.TRACKED: hex_colour(STATUS_RGB[Status.TRACKED]),
     JointStatus.UNCERTAIN: hex_colour(STATUS_RGB[Status.UNCERTAIN]),

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from airborne.export.palette import ESTIMATE_RGB, STATUS_RGB, TEXT_RGB, hex_colour
+from airborne.export.palette import ESTIMATE_RGB, PURPLE, STATUS_RGB, TEXT_RGB, hex_colour
 from airborne.io.figures import save_png
 from airborne.motion import Motion, root_angles
 from airborne.tracking import Status
@@ -28,8 +28,8 @@ TEXT, LINE, FAINT = hex_colour(TEXT_RGB), hex_colour(ESTIMATE_RGB), "#dddddd"
 _MARKERS = {Status.TRACKED: "o", Status.UNCERTAIN: "D"}
 _BAND_STYLE = {"facecolor": LINE, "alpha": 0.25, "linewidth": 0}
 LOST_STYLE = {"facecolor": "#cccccc", "edgecolor": "none", "alpha": 0.8}
-UNOBSERVABLE_STYLE = {"facecolor": "none", "edgecolor": "#cc79a7", "hatch": "////", "linewidth": 0.0}
-SINGULAR_STYLE = {"facecolor": "#cc79a7", "edgecolor": "none", "alpha": 0.18}
+UNOBSERVABLE_STYLE = {"facecolor": "none", "edgecolor": PURPLE, "hatch": "////", "linewidth": 0.0}
+SINGULAR_STYLE = {"facecolor": PURPLE, "edgecolor": "none", "alpha": 0.18}
 
 
 def panel_figure(n_rows: int, n_columns: int, *, row_in: float) -> tuple[Figure, list[list[Axes]]]:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from airborne.export import panels
 from airborne.export.page import UNKNOWN_TEXT, render_report
-from airborne.export.palette import STATUS_RGB, hex_colour
+from airborne.export.palette import BLUE, GREEN, PURPLE, STATUS_RGB, hex_colour
 from airborne.export.players_notes import (
     drop_notes,
     is_known,
@@ -30,7 +30,7 @@ from airborne.motion.run_folder import REPORT, figures_of
 from airborne.tracking import Status
 
 HEIGHTS_FIGURE = "heights.png"
-_JOINT_COLOURS = {"hip": "#0072b2", "knee": "#cc79a7", "ankle": "#009e73"}
+_JOINT_COLOURS = {"hip": BLUE, "knee": PURPLE, "ankle": GREEN}
 _UNCERTAIN_STYLE = {"facecolor": hex_colour(STATUS_RGB[Status.UNCERTAIN]), "edgecolor": "none", "alpha": 0.25}
 
 _JUMP_QUANTITIES = {  # columns of jumps.csv that the report shows: name, factor, digits

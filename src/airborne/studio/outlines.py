@@ -12,7 +12,7 @@ import numpy as np
 
 from airborne.body import PosedBody
 from airborne.cameras import Camera
-from airborne.export.palette import STATUS_RGB, hex_colour
+from airborne.export.palette import BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, STATUS_RGB, VERMILION, hex_colour
 from airborne.export.views import cached_surface_arrays
 from airborne.motion import PlayersMotion
 from airborne.motion.run_folder import holds_players
@@ -24,8 +24,8 @@ from airborne.tracking.image_regions import bounding_points
 from airborne.types import Array
 
 _COLOURS = {status.value: hex_colour(rgb) for status, rgb in STATUS_RGB.items()}
-_TEAM_COLOURS = (("#56b4e9", "#009e73", "#0072b2"), ("#e69f00", "#d55e00", "#cc79a7"))  # before and behind the net
-BESIDE_COLOUR = "#cc79a7"  # of another run that is laid over the one in view
+_TEAM_COLOURS = ((SKY_BLUE, GREEN, BLUE), (ORANGE, VERMILION, PURPLE))  # before and behind the net
+BESIDE_COLOUR = PURPLE  # of another run that is laid over the one in view
 _RIM_PX = 2  # about the body, so that no outline runs along the border of what is drawn
 
 

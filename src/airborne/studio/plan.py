@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from airborne.export.palette import VERMILION
 from airborne.types import Array
 
 _WIDE_PX, _HIGH_PX, _RIM_PX = 270, 110, 8  # of the drawing, at most; about the points
-_POINT, _CHOSEN, _LINE = "#5d666f", "#d55e00", "#9aa3ab"
+_POINT, _CHOSEN, _LINE = "#5d666f", VERMILION, "#9aa3ab"
 
 
 def plan_svg(world: Array, chosen: int, lines: Sequence[Array]) -> str:

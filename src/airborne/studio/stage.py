@@ -18,12 +18,13 @@ from trimesh.exchange.stl import export_stl
 from airborne.body import BodyModel, Pose
 from airborne.cameras import Camera, Rig
 from airborne.errors import ResultError
+from airborne.export.palette import BLUE
 from airborne.export.part_meshes import part_colour, segment_mesh
 from airborne.export.views import cached_surface_arrays
 from airborne.tracking.image_regions import bounding_points
 from airborne.types import Array
 
-_CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", "#0072b2"
+_CAMERA_COLOUR, _PATH_COLOUR = "#1f2429", BLUE
 FROM = np.array([0.7, -0.9, 0.55])  # the side and height from which the scene is seen first
 _ALL_IN_VIEW = 1.4  # times a sphere's radius: from so far, along `FROM`, three.js's 75 degrees hold it with a margin
 _FLOOR = 2.0  # times `away_m`: how far the floor's squares of a metre reach; further away they would be one stripe

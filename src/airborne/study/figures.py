@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 
 from airborne.export import panels
 from airborne.export.page import label
+from airborne.export.palette import CYCLE
 from airborne.io.figures import save_png
 from airborne.study.comparison import Contrast, VariableComparison
 from airborne.study.spm import NOT_TESTED, format_p
 from airborne.types import Array
 
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito
+
 _GREY = "#333333"
 _PANEL_IN = 2.6  # height
 _COLUMNS = 3  # of the athletes' panels
@@ -69,10 +70,10 @@ def _draw_test(axes: Axes, axis: Array, contrast: Contrast) -> None:
     axes.plot(axis, test.t, color=_GREY)
     for threshold in (test.threshold, -test.threshold):
         if np.isfinite(threshold):
-            axes.axhline(threshold, color=_COLOURS[1], linestyle="--", linewidth=0.8)
+            axes.axhline(threshold, color=CYCLE[1], linestyle="--", linewidth=0.8)
     for low, high, p in test.clusters:
         ends = np.interp([low, high], np.arange(len(axis)), axis)
-        axes.axvspan(ends[0], ends[1], color=_COLOURS[1], alpha=0.15, linewidth=0)
+        axes.axvspan(ends[0], ends[1], color=CYCLE[1], alpha=0.15, linewidth=0)
         at = float(np.mean(ends))
         axes.annotate(
             format_p(p), (at, 0.02), xycoords=("data", "axes fraction"), ha="center", fontsize=panels.FONT_PT - 1
@@ -135,4 +136,4 @@ def _numbers(comparison: VariableComparison) -> Figure:
 
 
 def _colour(k: int) -> str:
-    return _COLOURS[k % len(_COLOURS)]
+    return CYCLE[k % len(CYCLE)]

@@ -10,11 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airborne.export import panels
+from airborne.export.palette import BLUE, GREEN, ORANGE
 from airborne.io.figures import save_png
 from airborne.reproduction.block.plan import BLOCK_METHODS, PAPER_PARTS, PAPER_SUCCESS
 from airborne.reproduction.block.summary import Record, Summary, by_sequence, success
 
-_COLOURS = {"framework": "#999999", "mixture": "#e69f00", "block-jump": "#0072b2", "blocker": "#009e73"}
+_COLOURS = {"framework": "#999999", "mixture": ORANGE, "block-jump": BLUE, "blocker": GREEN}
 _TITLES = ("left hip", "right hip", "left knee", "right knee", "left foot", "right foot")
 _LEAST_MM = 3.0  # lower end of a logarithmic axis
 
@@ -77,9 +78,9 @@ def _write_sweep(path: Path, summary: Summary) -> None:
     rows = [row for row in summary["sweep"] if row["success"]]
     counts = [row["n_particles"] for row in rows]
     for part, colour, columns in (
-        ("hips", "#0072b2", (0, 1)),
-        ("knees", "#e69f00", (2, 3)),
-        ("feet", "#009e73", (4, 5)),
+        ("hips", BLUE, (0, 1)),
+        ("knees", ORANGE, (2, 3)),
+        ("feet", GREEN, (4, 5)),
     ):
         mean = [100 * np.mean([row["success"]["mean"][k] for k in columns]) for row in rows]
         axes.plot(counts, mean, "o-", color=colour, label=part)

@@ -12,6 +12,7 @@ from airborne.calibration.sources.court import court_lines
 from airborne.cameras import Rig
 from airborne.cameras.finding import Finding
 from airborne.errors import AirborneError, count
+from airborne.export.palette import SKY_BLUE
 from airborne.studio.clicks import Clicked, count_clicked, read_survey
 from airborne.studio.pages.layout import complain, show_findings
 from airborne.studio.pages.point_list import PointList
@@ -24,7 +25,7 @@ from airborne.studio.stage import draw_cameras, draw_rays
 from airborne.studio.view import Item, Mark
 from airborne.types import Array, Mask
 
-_CLICKED = "#56b4e9"
+_CLICKED = SKY_BLUE
 _LINE_POINTS = 60  # of a court's line, which a lens bends
 
 

@@ -11,6 +11,7 @@ from nicegui import Client, app, run, ui
 from nicegui.events import KeyEventArguments
 
 from airborne.errors import AirborneError
+from airborne.export.palette import BLUE
 from airborne.studio.guide import next_task
 from airborne.studio.project import steps
 from airborne.studio.session import Session
@@ -18,7 +19,7 @@ from airborne.studio.session import Session
 _T = TypeVar("_T")
 _SILENT_S = 0.1  # a wait that is not announced: shorter ones are not felt as such
 _LOOK_EVERY_S = 0.25  # for changes by this window, by others and by other programs: the rail follows at once
-_BLUE = "#0072b2"  # of buttons: dark enough for white letters
+_BLUE = BLUE  # of buttons: dark enough for white letters
 _GREEN = "#006b3c"  # of good news, likewise
 _KEYS = {
     "← →": "one frame back or on; with Shift ten",

@@ -11,6 +11,7 @@ from nicegui.events import KeyEventArguments
 
 from airborne.cameras import Rig
 from airborne.cameras.epipolar import epipolar_curve
+from airborne.export.palette import BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION, YELLOW
 from airborne.studio.clicks import Clicked
 from airborne.studio.pages.layout import Latest, complain, show_errors
 from airborne.studio.pictures import ShownTrial
@@ -18,8 +19,8 @@ from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Drag, Item
 from airborne.types import Array, Mask
 
-CAMERA_COLOURS = ("#56b4e9", "#e69f00", "#cc79a7", "#009e73", "#0072b2", "#d55e00")  # in order
-CHOSEN_COLOUR = "#f0e442"
+CAMERA_COLOURS = (SKY_BLUE, ORANGE, PURPLE, GREEN, BLUE, VERMILION)  # in order
+CHOSEN_COLOUR = YELLOW
 PREDICTED_COLOUR = "#c8cdd3"  # where a point that is not clicked may be
 CLICK_SD_PX = 1.0  # of a careful click, right and down: the band is two of these
 

@@ -13,6 +13,7 @@ from nicegui import ui
 from nicegui.elements.scene.scene import Scene
 
 from airborne.errors import format_digits
+from airborne.export.palette import VERMILION
 from airborne.motion.run_folder import SUMMARY, holds_players, read_summary
 from airborne.studio.curve_data import Momenta, curve_kinds, describe_distance, run_momenta
 from airborne.studio.disagreement import look_for_disagreement
@@ -30,7 +31,7 @@ from airborne.studio.stage import Arrow, BodyOnStage, Sticks, draw_cameras, over
 from airborne.studio.view import CameraViews, Curves
 from airborne.tracking import Status
 
-_MOMENTUM_COLOUR, _LONGEST_M = "#d55e00", 1.0  # its arrow's length where it is greatest in the run
+_MOMENTUM_COLOUR, _LONGEST_M = VERMILION, 1.0  # its arrow's length where it is greatest in the run
 _HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations, numbers ± one."
 
 
