@@ -17,7 +17,6 @@ from airborne.study.comparison import Contrast, VariableComparison
 from airborne.study.spm import NOT_TESTED, format_p
 from airborne.types import Array
 
-
 _GREY = "#333333"
 _PANEL_IN = 2.6  # height
 _COLUMNS = 3  # of the athletes' panels
