@@ -18,9 +18,10 @@ from airborne.video.pixels import plane_rows
 
 _N_SAMPLES = 8_000  # chosen: of a picture that are compared, whatever its size
 _SHARE_BELOW = 0.998  # chosen: of the changes of its samples; a body covers a hundredth of a picture or less
-# chosen on 30 recordings, nine of them with repeated pictures: from one picture to the next what moves changes its
-# samples by 5 to 139 grey levels and never stops within one, a repeated and compressed one by up to 1
-_MOVING_GREY, _REPEATED_GREY = 6.0, 1.0
+# chosen on 34 recordings, 13 of them with repeated pictures: what moves changes samples from picture to picture by 5 to
+# 139 grey levels, 0.34 times as much as to the picture before or more; a repeated and compressed one changes by 1 level
+# or 0.11 times as much at most
+_MOVING_GREY, _REPEATED_GREY, _REPEATED_SHARE = 6.0, 1.0, 0.15
 _FEWEST, _MOST_CHANGED = 10, 0.1  # chosen: pictures of a still video at least; share of them that compression changes
 
 
@@ -35,8 +36,8 @@ class PictureChanges:
     _frame: av.VideoFrame | None = None
     _samples: NDArray[np.uint8] | None = None
     _time_s: Fraction | None = None
-    _is_moving: bool = False  # whether something moved from the picture before the last to the last
-    _is_repeated: bool = False  # the last
+    _motion_grey: float = 0.0  # change by what moved to the last picture that repeats none; 0 if nothing did
+    _is_repeated: bool = False  # the last picture
     _n: int = 0
     _n_changed: int = 0
 
@@ -62,13 +63,14 @@ class PictureChanges:
         before, now = self._samples, _samples_of(frame)
         self._frame, self._samples = frame, now
         if before is None or now is None or before.shape != now.shape:
-            self._is_moving = self._is_repeated = False
+            self._motion_grey, self._is_repeated = 0.0, False
             return
         changes = cv2.absdiff(now, before).ravel()
         counts = np.bincount(changes, minlength=256).cumsum()
         usual, change = (int(counts.searchsorted(int(q * (len(changes) - 1)), "right")) for q in (0.5, _SHARE_BELOW))
-        self._is_repeated = change <= _REPEATED_GREY and (self._is_moving or self._is_repeated)
-        self._is_moving = change >= _MOVING_GREY > usual  # where most changes it is a flash, a cut, or goes dark
+        self._is_repeated = self._motion_grey > 0 and change <= max(_REPEATED_GREY, _REPEATED_SHARE * self._motion_grey)
+        if not self._is_repeated:  # where most of it changes it is a flash, a cut, or goes dark
+            self._motion_grey = change if change >= _MOVING_GREY > usual else 0.0
         self._n, self._n_changed = self._n + 1, self._n_changed + (change > 0)
 
     @property
