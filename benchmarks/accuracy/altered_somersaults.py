@@ -1,8 +1,8 @@
 """Track recorded somersaults that are made harder: `python benchmarks/accuracy/altered_somersaults.py [FOLDER]`.
 
 FOLDER holds `somersault_1` and `somersault_2`; by default they are looked for beside the project. Each is encoded again
-as it is, backward, at half the frame rate, darkened with noise, at half the size, from its middle on, and without each
-camera. No constant was chosen on these. Some 6 minutes.
+as it is, backward, at half the frame rate, darkened with noise, at half the size, with pictures repeated in
+all cameras, from its middle on, and without each camera. No constant was chosen on these. Some 6 minutes.
 """
 
 from __future__ import annotations
@@ -52,6 +52,13 @@ class Recording:
         """Change every image."""
         return replace(self, images={name: [change(each) for each in of] for name, of in self.images.items()})
 
+    def repeat(self, rows: Sequence[int]) -> Recording:
+        """Show what the frame before showed, in some frames of all cameras; the truth goes on."""
+        shown = list(range(len(self.frames)))
+        for row in rows:
+            shown[row] = shown[row - 1]
+        return replace(self, images={name: [of[row] for row in shown] for name, of in self.images.items()})
+
     def select(self, rows: slice, rate_hz: int | None = None) -> Recording:
         """Take some of the frames."""
         images = {name: of[rows] for name, of in self.images.items()}
@@ -76,6 +83,9 @@ def alterations(whole: Recording) -> Iterator[tuple[str, Recording]]:
     yield "half the frame rate", whole.select(slice(None, None, 2), whole.rate_hz // 2)
     yield "dark, noisy", whole.map(darken)
     yield "half the size", replace(whole.map(halve), scale=0.5)
+    n = len(whole.frames)
+    yield "every sixth repeated", whole.repeat(range(6, n, 6))
+    yield "last ten repeated", whole.repeat(range(n - 10, n))
     yield "from the middle on", whole.select(slice(len(whole.frames) // 2, None))
     for left_out in whole.images:
         images = {name: of for name, of in whole.images.items() if name != left_out}
