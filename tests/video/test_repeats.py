@@ -72,6 +72,15 @@ def test_a_reading_that_goes_on_from_between_two_fields_of_a_picture_sees_no_rep
         assert all(view is not None for frames in seen for view in frames.views)
 
 
+def test_a_key_frame_among_repeated_pictures_is_repeated_though_compressed_anew(tmp_path):
+    faint = [np.where(picture > 90, 100, 90).astype(np.uint8) for picture in moving()]
+    noise = np.random.default_rng(0).integers(-1, 2, (48, 64, 1), np.int8)
+    anew = (faint[5] + 2 * noise).astype(np.uint8)
+    seen, (said,) = read(tmp_path, [*faint[:6], faint[5], faint[5], anew, faint[5], *faint[10:]], codec="ffv1")
+    assert said.startswith("b: frames 6 to 9 repeat")
+    assert [k for k, frames in enumerate(seen) if frames.views[1] is None] == [6, 7, 8, 9]
+
+
 def test_of_a_flash_a_cut_and_a_dark_picture_nothing_is_said(tmp_path):
     still, dark, bright = (np.full((48, 64, 3), level, np.uint8) for level in (90, 0, 250))
     _, said = read(tmp_path, [still, still, dark, dark, dark, still, still, bright, still, still, *moving()[:4]])

@@ -22,6 +22,7 @@ _SHARE_BELOW = 0.998  # chosen: of the changes of its samples; a body covers a h
 # 139 grey levels, 0.34 times as much as to the picture before or more; a repeated and compressed one changes by 1 level
 # or 0.11 times as much at most
 _MOVING_GREY, _REPEATED_GREY, _REPEATED_SHARE = 6.0, 1.0, 0.15
+_AGAIN_SHARE = 0.3  # chosen: the same where others were repeated before it: a key frame is compressed anew
 _FEWEST, _MOST_CHANGED = 10, 0.1  # chosen: pictures of a still video at least; share of them that compression changes
 
 
@@ -34,7 +35,7 @@ class PictureChanges:
 
     _repeated: set[Fraction] = field(default_factory=set)  # times of the images that repeat the ones before [s]
     _frame: av.VideoFrame | None = None
-    _samples: NDArray[np.uint8] | None = None
+    _samples: NDArray[np.uint8] | None = None  # of the last picture that repeats none
     _time_s: Fraction | None = None
     _motion_grey: float = 0.0  # change by what moved to the last picture that repeats none; 0 if nothing did
     _is_repeated: bool = False  # the last picture
@@ -60,17 +61,17 @@ class PictureChanges:
         return last is not None and (frame is last or (frame.pts is not None and frame.pts == last.pts))
 
     def _look_at(self, frame: av.VideoFrame) -> None:
-        before, now = self._samples, _samples_of(frame)
-        self._frame, self._samples = frame, now
+        before, now, self._frame = self._samples, _samples_of(frame), frame
         if before is None or now is None or before.shape != now.shape:
-            self._motion_grey, self._is_repeated = 0.0, False
+            self._samples, self._motion_grey, self._is_repeated = now, 0.0, False
             return
         changes = cv2.absdiff(now, before).ravel()
         counts = np.bincount(changes, minlength=256).cumsum()
         usual, change = (int(counts.searchsorted(int(q * (len(changes) - 1)), "right")) for q in (0.5, _SHARE_BELOW))
-        self._is_repeated = self._motion_grey > 0 and change <= max(_REPEATED_GREY, _REPEATED_SHARE * self._motion_grey)
+        most = max(_REPEATED_GREY, (_AGAIN_SHARE if self._is_repeated else _REPEATED_SHARE) * self._motion_grey)
+        self._is_repeated = self._motion_grey > 0 and change <= most
         if not self._is_repeated:  # where most of it changes it is a flash, a cut, or goes dark
-            self._motion_grey = change if change >= _MOVING_GREY > usual else 0.0
+            self._samples, self._motion_grey = now, change if change >= _MOVING_GREY > usual else 0.0
         self._n, self._n_changed = self._n + 1, self._n_changed + (change > 0)
 
     @property
