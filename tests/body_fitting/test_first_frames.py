@@ -67,7 +67,7 @@ def test_person_who_is_uncertain_in_the_first_frame_is_fitted_in_those_after(mon
 
     monkeypatch.setattr(preset_shape, "track_frames", track)
     monkeypatch.setattr(body, "keys_of_frames", lambda trial, model, recording: ({9: model}, []))
-    trial = SimpleNamespace(body=SimpleNamespace(preset="human18", mass_kg=MASS_KG), settings=Settings())
+    trial = SimpleNamespace(body=SimpleNamespace(is_preset=True, mass_kg=MASS_KG), settings=Settings())
     run = BodyRun(trial, Clip(), None, DRESSED, POSE)._fit_shape(SCENE.frames(0))
     assert girths_off(run.model) < 0.5 * girths_off(DRESSED)
     assert run.start is POSE
