@@ -52,7 +52,7 @@ def test_players_without_a_start_are_found_and_tracked_from_the_first_frame(path
     run = track_trial(read_trial(path), tmp_path / "run", pictures=False)
     assert run.motion.players == ("player1", "player2")
     assert run.motion.index[0] == 0
-    assert run.summary["events"][0].startswith("[[start.player]]: 2 players found, who stand out best in frame ")
+    assert run.summary["events"][0].startswith("[[start.player]]: 2 players found, who stand out in frame ")
     joints = [run.motion.joints.index(name) for name in ("hip_left", "knee_left", "ankle_left")]
     for number, name in enumerate(HALL.motions):
         off_m = run.motion.points[0, number, joints] - HALL.truth(name, 0)[[0, 2, 4]]

@@ -71,7 +71,7 @@ def find_players_start(
     frame, starts = _track_back(trial, recording, finding)
     stand = "stands" if len(starts) == 1 else "stand"
     note = (
-        f"[[start.player]]: {count(len(starts), 'player')} found, who {stand} out best in frame {finding.frames.index} "
+        f"[[start.player]]: {count(len(starts), 'player')} found, who {stand} out in frame {finding.frames.index} "
         f"({describe_probability(first.probability)}) and can be followed back to frame {frame}"
     )
     in_the_air = list_doubts(doubt_starts(starts, None))

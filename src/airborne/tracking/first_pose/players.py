@@ -90,7 +90,7 @@ class PlayersCandidate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayersSearch:
-    """What was found at the moment in which players are seen best."""
+    """What was found at one moment."""
 
     frames: Frames
     candidates: tuple[PlayersCandidate, ...]  # the likeliest first
@@ -113,7 +113,8 @@ def find_players(
     near_net: bool = True,
     progress: Progress | None = None,
 ) -> PlayersSearch:
-    """Find the players at the net, or all on the cameras' half of the court, at the best of some times.
+    """Find the players at the net, or all on the cameras' half of the court, at the earliest of some times that
+    decides, or the best.
 
     `sample` holds small pictures, `whole` returns those of a frame's number in full size. The world is the court's: its
     origin in the middle on the floor, x along the net. Raises TrialError where nobody is found.
