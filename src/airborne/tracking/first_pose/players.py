@@ -113,10 +113,9 @@ def find_players(
     near_net: bool = True,
     progress: Progress | None = None,
 ) -> PlayersSearch:
-    """Find the players at the net, or all on the cameras' half of the court, at the earliest of some times that
-    decides, or the best.
+    """Find the players at the net, or all on the cameras' half of the court, at one of some times.
 
-    `sample` holds small pictures, `whole` returns those of a frame's number in full size. The world is the court's: its
+    It is the earliest of those that decide, or the likeliest. `sample` holds small pictures, `whole` returns those of a frame's number in full size. The world is the court's: its
     origin in the middle on the floor, x along the net. Raises TrialError where nobody is found.
     """
     sample = [frames for frames in sample if sum(view is not None for view in frames.views) > 1]
