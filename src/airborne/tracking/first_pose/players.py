@@ -115,8 +115,9 @@ def find_players(
 ) -> PlayersSearch:
     """Find the players at the net, or all on the cameras' half of the court, at one of some times.
 
-    It is the earliest of those that decide, or the likeliest. `sample` holds small pictures, `whole` returns those of a frame's number in full size. The world is the court's: its
-    origin in the middle on the floor, x along the net. Raises TrialError where nobody is found.
+    It is the earliest of those that decide, or the likeliest. `sample` holds small pictures, `whole` returns those of a
+    frame's number in full size. The world is the court's: its origin in the middle on the floor, x along the net.
+    Raises TrialError where nobody is found.
     """
     sample = [frames for frames in sample if sum(view is not None for view in frames.views) > 1]
     moments = [_Moment.of(frames, near_net=near_net) for frames in sample[:: -(-len(sample) // _MOST_MOMENTS) or 1]]
