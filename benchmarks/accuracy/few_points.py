@@ -23,8 +23,8 @@ from airborne.calibration.sources.court import court_points, survey_points
 from airborne.cameras import Camera, Rig, camera_looking_at
 from airborne.types import Array
 
-WIDTH, HEIGHT = 1920, 1080
-SEEDS, N_POINTS = range(11, 21), (8, 12, 17)
+WIDTH, HEIGHT = 1920, 1080  # [px]; chosen as usual
+SEEDS, N_POINTS = range(11, 21), (8, 12, 17)  # chosen: any; fewer points than were asked of a lens once
 
 
 def around_a_volume(rng: np.random.Generator) -> Iterator[Camera]:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 
-UNDECIDED, STOPPED = 3, 130  # exit codes of the command line beside 2: of an UndecidedError, of Ctrl-C
+# exit codes of the command line beside 2: of a run of which hardly a frame is tracked, an UndecidedError, Ctrl-C
+UNTRACKED, UNDECIDED, STOPPED = 1, 3, 130
 _LONGEST = 1200  # characters of a message
 _OTHER_WORDS = {"end": ("stop",), "last": ("stop",), "first": ("frame",), "step": ("every",), "path": ("file", "video")}
 MOST_SAID = 5  # mistakes of one file in a line

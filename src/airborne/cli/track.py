@@ -13,7 +13,7 @@ import typer
 
 from airborne.cli.console import Json, Out, progress, stop
 from airborne.cli.results import evaluate_command
-from airborne.errors import AirborneError, count, count_of, format_digits
+from airborne.errors import UNTRACKED, AirborneError, count, count_of, format_digits
 from airborne.io.terminal import Stages
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def track_command(
 
     is_found = count_tracked(run.summary) or (first_frame and run.summary.get("n_uncertain"))
     if not is_found or is_hardly_tracked(run.summary):
-        raise typer.Exit(1)
+        raise typer.Exit(UNTRACKED)
 
 
 def _track(

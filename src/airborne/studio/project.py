@@ -47,6 +47,11 @@ class Project:
         return dict(found) if isinstance(found, dict) else {}
 
     @property
+    def has_players(self) -> bool:
+        """Whether the trial's body is the legs of players."""
+        return self.table("body").get("preset") == "legs"
+
+    @property
     def cameras_stamp(self) -> str:
         """What changes whenever the cameras do."""
         return repr(self.cameras)
@@ -224,7 +229,7 @@ def _body_state(project: Project) -> tuple[StepState, str]:
     if file and not (project.folder / str(file)).is_file():
         return "needs you", f"{file} not found"
     if what := file or body.get("preset"):
-        return "ready", "players" if what == "legs" else str(what)
+        return "ready", "players" if project.has_players else str(what)
     return ("needs you" if project.cameras else "empty"), "choose what is tracked"
 
 
@@ -234,9 +239,7 @@ def _start_state(project: Project) -> tuple[StepState, str]:
         return "ready", f"frame {start.get('frame', 0)}"
     if not project.table("body") or not project.table("calibration"):
         return "empty", "where the body is"
-    return "needs you", "where are the players?" if project.table("body").get(
-        "preset"
-    ) == "legs" else "where is the body?"
+    return "needs you", "where are the players?" if project.has_players else "where is the body?"
 
 
 def _find_changed_tables(project: Project, run: Path) -> list[str]:

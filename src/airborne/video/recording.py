@@ -47,6 +47,7 @@ class Recording:
     events: list[str] = field(default_factory=list)  # what the user should know, one line each; grows while reading
     _gaps: dict[str, dict[Fraction, Fraction]] = field(default_factory=dict)  # of each camera, from -> to [s]
     _repeats: dict[str, list[tuple[int, int]]] = field(default_factory=dict)  # of each camera, first and last frames
+    _said_of_repeats: list[str] = field(default_factory=list)  # among the events
     _known: dict[tuple[str, bool], tuple[Camera, dict[int | None, Undistortion]]] = field(default_factory=dict)
     _changes: dict[str, PictureChanges] = field(default_factory=dict)  # of each camera's pictures, looked at once
 
@@ -75,6 +76,7 @@ class Recording:
         period_s = 1 / self.facts[0].image_rate
         undistortions = [self._undistortions(camera, facts) for camera, facts in zip(self.rig, self.facts, strict=True)]
         with ExitStack() as open_files:
+            open_files.callback(self._note_repeats)
             cursors = [
                 _Cursor(open_files.enter_context(closing(self._decode_on_clock(source, facts))), half_s=period_s / 2)
                 for source, facts in zip(self.sources, self.facts, strict=True)
@@ -135,7 +137,7 @@ class Recording:
                 if time_s > expected_s + period_s / 2:
                     self._note_gap(source.name, expected_s, time_s)
                 if changes.add(image):
-                    self._note_repeated(source, time_s)
+                    self._add_repeat(source, time_s)
                 else:
                     yield image._replace(time_s=time_s)
                 expected_s = time_s + period_s
@@ -147,18 +149,22 @@ class Recording:
                 f"{source.name}: the images end at {float(expected_s):.3f} s; the file promises {float(end_s):.3f} s"
             )
 
-    def _note_repeated(self, source: VideoSource, time_s: Fraction) -> None:
-        """Note a repeated image in the line that says all of its camera's, and of those whose are the same."""
+    def _add_repeat(self, source: VideoSource, time_s: Fraction) -> None:
+        """Add a repeated image to its camera's runs of them."""
         frame = round((time_s - self.sources[0].trial_time(Fraction(0))) * self.facts[0].image_rate)
         runs = self._repeats.setdefault(source.name, [])
         if runs and frame <= runs[-1][1]:
             return  # a recording may be read twice
-        before = set(describe_repeats(self._repeats))
         if runs and frame == runs[-1][1] + 1:
             runs[-1] = runs[-1][0], frame
         else:
             runs.append((frame, frame))
-        self.events[:] = [*(event for event in self.events if event not in before), *describe_repeats(self._repeats)]
+
+    def _note_repeats(self) -> None:
+        """Name all repeated images so far, in the place of what was said of them before."""
+        said = [*describe_repeats(self._repeats)]
+        self.events[:] = [*(event for event in self.events if event not in self._said_of_repeats), *said]
+        self._said_of_repeats[:] = said
 
     def _note_gap(self, name: str, from_s: Fraction, to_s: Fraction) -> None:
         """Note a gap in the line that says all of a camera's."""

@@ -26,8 +26,7 @@ _NO_LANDMARKS = (
 async def first_pose_page(session: Session) -> None:
     """Let the user find or click the pose at one frame, and write it into the trial."""
     project = session.project()
-    are_players = project.table("body").get("preset") == "legs"
-    title = "Where are the players at the start?" if are_players else "Where is the body at the start?"
+    title = "Where are the players at the start?" if project.has_players else "Where is the body at the start?"
     async with page_frame(session, "First pose", title, _HELP) as changed:
         if name_missing_steps(session, changed, "Videos", "Cameras", "Body"):
             return
@@ -37,7 +36,7 @@ async def first_pose_page(session: Session) -> None:
             return
         start = read_draft_start(session) or project.table("start")
         frame = int(start.get("frame", session.frame))
-        if are_players:
+        if project.has_players:
             players = PlayersPanel(session, shown, rig, frame)
             await _build_either(players, FindPlayersPanel(session, shown, rig, frame), changed)
             return

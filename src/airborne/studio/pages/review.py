@@ -31,7 +31,7 @@ from airborne.studio.stage import Arrow, BodyOnStage, Sticks, draw_cameras, over
 from airborne.studio.view import CameraViews, Curves
 from airborne.tracking import Status
 
-_MOMENTUM_COLOUR, _LONGEST_M = VERMILION, 1.0  # its arrow's length where it is greatest in the run
+_MOMENTUM_COLOUR, _LONGEST_M = VERMILION, 1.0  # chosen: its arrow's length where it is greatest in the run
 _HELP = "Pictures, curves and scene share one frame. Bands are two standard deviations, numbers ± one."
 
 

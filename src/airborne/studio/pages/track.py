@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from airborne.errors import STOPPED, AirborneError, ResultError, TrialError, count
+from airborne.errors import STOPPED, UNTRACKED, AirborneError, ResultError, TrialError, count
 from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY, read_summary
 from airborne.studio.commands import Command
 from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
@@ -22,7 +22,6 @@ from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Curves
 
 _LOOK_EVERY_S = 1.0  # at a run that goes on
-_UNTRACKED = 1  # exit code of a whole run of which hardly a frame is tracked
 _HELP = (
     "Tracking runs in a process of its own: go on working, or close the browser. "
     "A run that is stopped keeps its frames and goes on where it was. To try another method, name another folder."
@@ -231,7 +230,7 @@ class _Panel:
         elif command.code == STOPPED:
             self._tell("stopped")
         else:
-            said = self._say_untracked(command) if command.code == _UNTRACKED else command.complaint()
+            said = self._say_untracked(command) if command.code == UNTRACKED else command.complaint()
             self._tell(said, is_wrong=True)
             complain(said)
         self._show_buttons()
