@@ -7,6 +7,7 @@ import pytest
 
 from airborne.errors import ResultError
 from airborne.motion.free_fall import free_fall_height, noise_covariance
+from airborne.motion.jumps import heights
 from airborne.motion.jumps.heights import measure_jumps
 from airborne.motion.jumps.standing_posture import leg_lengths
 from airborne.motion.local_polynomials import local_fits
@@ -119,6 +120,24 @@ def test_the_same_motion_gives_the_same_numbers():
     motion = motion_of(CLEAN, sd_m=0.02, rng=np.random.default_rng(5))
     one, other = only(motion), only(motion)
     assert [getattr(one, name) for name in HEIGHTS] == [getattr(other, name) for name in HEIGHTS]
+
+
+def test_a_measurement_that_is_left_out_moves_no_other(monkeypatch):
+    motion = motion_of(CLEAN, sd_m=0.02, rng=np.random.default_rng(5))
+    whole = only(motion)
+    peak = heights._peak
+    of_hips = motion.points[:, 0, :2].mean(axis=1)[:, 2]
+    monkeypatch.setattr(
+        heights,
+        "_peak",
+        lambda rng, track, flight, path, **prior: (
+            None if np.array_equal(path[0][:, 2], of_hips) else peak(rng, track, flight, path, **prior)
+        ),
+    )
+    rest = only(motion)
+    assert np.isnan(rest.hip_height_m.value)
+    same = ("foot_height_m", "takeoff_speed_m_s", "drift_m", "takeoff_position_m", "landing_position_m", "standing")
+    assert [getattr(rest, name) for name in same] == [getattr(whole, name) for name in same]
 
 
 def test_more_noise_gives_wider_intervals():

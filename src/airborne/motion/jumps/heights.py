@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,11 +46,10 @@ def measure_jumps(motion: PlayersMotion, *, block_level_m: float = _BLOCK_LEVEL_
         for first, last in flights:
             floor[first : last + 1] = False
         for number, rows in enumerate(flights, 1):
-            rng = np.random.default_rng((_SEED, number))
             middle = (track.time_s[rows[0]] + track.time_s[rows[1]]) / 2
             near = floor & (np.abs(track.time_s - middle) <= NEAR_S)
-            flight = sample_flight(rng, track, rows, near)
-            jumps.append(_measure_jump(rng, track, flight, near, number=number, block_level_m=block_level_m))
+            flight = sample_flight(_generator(number, "flight"), track, rows, near)
+            jumps.append(_measure_jump(track, flight, near, number=number, block_level_m=block_level_m))
     return tuple(jumps)
 
 
@@ -67,8 +68,12 @@ def describe_slow_falls(motion: PlayersMotion) -> list[str]:
     return said
 
 
+def _generator(number: int, measurement: str) -> np.random.Generator:
+    """Return a measurement's own random numbers in a player's jump of this number: a new one moves no other."""
+    return np.random.default_rng((_SEED, number, *measurement.encode()))
+
+
 def _measure_jump(
-    rng: np.random.Generator,
     track: LegTrack,
     flight: FlightPosterior,
     floor: NDArray[np.bool_],
@@ -78,19 +83,21 @@ def _measure_jump(
 ) -> Jump:
     track = track.scale_variances(flight.noise_scale)
     takeoff, landing = flight.takeoff_s, flight.landing_s
-    stand, hips_stand, ankles_stand = measure_standing_posture(rng, track, floor)
-    hips = _peak(rng, track, flight, track.mid_hips, acceleration_prior=_HIPS_ACCELERATION_PRIOR)
-    ankles = _peak(rng, track, flight, track.mid_ankles, acceleration_prior=_FEET_ACCELERATION_PRIOR)
+    rng = partial(_generator, number)
+    stand, hips_stand, ankles_stand = measure_standing_posture(rng("standing"), track, floor)
+    hips = _peak(rng("hips"), track, flight, track.mid_hips, acceleration_prior=_HIPS_ACCELERATION_PRIOR)
+    ankles = _peak(rng("ankles"), track, flight, track.mid_ankles, acceleration_prior=_FEET_ACCELERATION_PRIOR)
     foot_height = None if ankles is None else ankles - ankles_stand
     hip_height = None if hips is None else hips - hips_stand
     tuck = Measurement.from_draws(None if foot_height is None or hip_height is None else foot_height - hip_height)
     is_astray = are_legs_lost(flight.noise_scale, tuck.value)
     if is_astray:  # feet tell take-off and landing
         foot_height = takeoff = landing = None
-    limb_speed = _UNTRACKED_LIMBS_M_S * rng.standard_normal(N_DRAWS)
+    limb_speed = _UNTRACKED_LIMBS_M_S * rng("speed").standard_normal(N_DRAWS)
     speed = None if takeoff is None else flight.speed(takeoff) + limb_speed
     flight_s = None if takeoff is None or landing is None else landing - takeoff
-    start, end = _ankle_position_draws(rng, track, takeoff), _ankle_position_draws(rng, track, landing)
+    start = _ankle_position_draws(rng("takeoff_position"), track, takeoff)
+    end = _ankle_position_draws(rng("landing_position"), track, landing)
     rows = _flight_rows(track, flight)
     n_uncertain, n_hips_uncertain = (int(each[rows].sum()) for each in (track.is_uncertain, track.are_hips_uncertain))
     over = None if hip_height is None else np.maximum(hip_height - block_level_m, 0.0)
@@ -112,7 +119,7 @@ def _measure_jump(
         tuck_m=tuck,
         flight_time_height_m=Measurement.from_draws(None if flight_s is None else GRAVITY_M_S2 * flight_s**2 / 8),
         takeoff_speed_height_m=Measurement.from_draws(None if speed is None else speed**2 / (2 * GRAVITY_M_S2)),
-        hip_rise_m=_hip_rise(rng, track, takeoff, hips),
+        hip_rise_m=_hip_rise(rng("hip_rise"), track, takeoff, hips),
         takeoff_speed_m_s=Measurement.from_draws(speed),
         block_s=Measurement.from_draws(None if over is None else 2 * np.sqrt(2 * over / GRAVITY_M_S2)),
         block_level_m=block_level_m,
@@ -123,7 +130,7 @@ def _measure_jump(
         foot_peak_speed_m_s=UNKNOWN
         if is_astray
         else _peak_speed(track, flight, track.ankles, track.variances["ankles"]),
-        reach_m=_reach(rng, track, flight),
+        reach_m=_reach(rng("reach"), track, flight),
         standing=stand,
         noise_scale=flight.noise_scale,
         path_frames=track.index[rows],
