@@ -12,7 +12,7 @@ from airborne.cli.console import Json, errors, progress
 from airborne.errors import ResultError
 
 if TYPE_CHECKING:
-    from airborne.motion.smoothing.settings import Smoothing
+    from airborne.motion.smoothing.settings import Smoothing, SmoothingName
 
 
 def smooth_command(
@@ -39,7 +39,7 @@ def smooth_command(
 ) -> None:
     """Smooth a run and compute velocities and accelerations: new tables beside the raw ones.
 
-    Without --butterworth, --spline or --kalman the Kalman smoother, which uses the run's own covariances.
+    Without a method the Kalman smoother, which uses the run's own covariances.
 
     Example: airborne smooth results
     """
@@ -48,9 +48,13 @@ def smooth_command(
     from airborne.run.smooth import smooth_run
 
     note = ""
-    if butterworth is None and not (spline or kalman):
-        kalman, note = True, "no method was given: smoothed with --kalman, by the run's own covariances"
-    settings = _smoothing(butterworth, spline=spline, kalman=kalman, fill_s=fill, resample_hz=resample)
+    options: dict[SmoothingName, str | bool | None] = {"butterworth": butterworth, "spline": spline, "kalman": kalman}
+    given: dict[SmoothingName, str | bool] = {
+        name: value for name, value in options.items() if value not in (None, False)
+    }
+    if not given:
+        given["kalman"], note = True, "no method was given: smoothed with --kalman, by the run's own covariances"
+    settings = _smoothing(given, fill_s=fill, resample_hz=resample)
     with progress("smoothing") as report:
         done = smooth_run(results, settings, events_s=_times(events), out=output, progress=report)
     if note:
@@ -60,17 +64,15 @@ def smooth_command(
     print(json.dumps(json_ready(done.to_dict())) if as_json else done.describe())
 
 
-def _smoothing(
-    butterworth: str | None, *, spline: bool, kalman: bool, fill_s: float, resample_hz: float | None
-) -> Smoothing:
+def _smoothing(given: dict[SmoothingName, str | bool], *, fill_s: float, resample_hz: float | None) -> Smoothing:
+    """Return the one method that was given, with its settings: its option's value may be a cut-off."""
     from airborne.motion.smoothing.settings import Smoothing
 
-    if (butterworth is not None) + spline + kalman != 1:
-        raise ResultError("give one way to smooth: --butterworth 6, --butterworth auto, --spline or --kalman")
-    if butterworth is not None:
-        cutoff_hz = None if butterworth == "auto" else _number(butterworth, "--butterworth", "a cut-off in Hz, or auto")
-        return Smoothing(method="butterworth", cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
-    return Smoothing(method="spline" if spline else "kalman", resample_hz=resample_hz, fill_s=fill_s)
+    if len(given) > 1:
+        raise ResultError(f"give one way to smooth, not {' and '.join(f'--{name}' for name in given)}")
+    ((name, value),) = given.items()
+    cutoff_hz = None if value in (True, "auto") else _number(str(value), f"--{name}", "a cut-off in Hz, or auto")
+    return Smoothing(method=name, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)
 
 
 def _times(text: str) -> list[float] | None:

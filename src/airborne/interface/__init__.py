@@ -34,7 +34,7 @@ from airborne.interface.arguments import (
     to_times,
 )
 from airborne.io.names import to_path
-from airborne.motion.smoothing.settings import Smoothing
+from airborne.motion.smoothing.settings import SMOOTHING_METHODS, Smoothing, SmoothingName
 from airborne.run.evaluate import AgreementReport, Comparison, assess, evaluate_agreement
 from airborne.run.export import EXPORT_FORMATS, ExportResult
 from airborne.run.export import export_run as write_export
@@ -50,7 +50,6 @@ from airborne.types import Progress, Size, StageProgress
 __all__ = ["calibrate", "evaluate", "export_run", "fit_body", "read_run", "read_trial", "smooth", "synthesise", "track"]
 
 _SCENES = ("cross", "somersault", "block")
-_SMOOTHINGS = ("butterworth", "spline", "kalman")
 
 
 @explain_paths
@@ -217,7 +216,7 @@ def evaluate(
 @explain_paths
 def smooth(
     run: Run | FilePath,
-    method: Literal["butterworth", "spline", "kalman"] | None = None,
+    method: SmoothingName | None = None,
     *,
     cutoff_hz: float | None = None,
     fill_s: float = 0.0,
@@ -237,7 +236,7 @@ def smooth(
     'm/s'
     """
     method = method or ("kalman" if cutoff_hz is None else "butterworth")
-    require_choice(method, _SMOOTHINGS, "method")
+    require_choice(method, tuple(SMOOTHING_METHODS), "method")
     if not isinstance(cutoff_hz, float | int | None):
         raise AirborneError(f"cutoff_hz is {cutoff_hz!r}; expected Hz, or None for that of the residual analysis")
     settings = Smoothing(method=method, cutoff_hz=cutoff_hz, resample_hz=resample_hz, fill_s=fill_s)

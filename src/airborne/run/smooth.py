@@ -123,7 +123,7 @@ def smooth_run(
         own = [boundaries[owner] for owner in run.owners]
         analysis = residual_analysis(run.time_s, run.paths, boundaries_s=own)
         analysis = analysis if analysis.n_values else None
-    if smoothing.method == "butterworth" and smoothing.cutoff_hz is None:
+    if smoothing.lacks_cutoff:
         smoothing = replace(smoothing, cutoff_hz=_choose_cutoff(analysis))
     if not _has_stretch(run, boundaries, smoothing.fill_s):
         raise ResultError(

@@ -50,7 +50,7 @@ def smooth_root(motion: Motion, model: BodyModel, smoothing: Smoothing, boundari
     )
     rotation = smooth_rotations(smooth, motion.time_s, motion.R, variance, boundaries_s=boundaries_s, fill_s=fill_s)
     history, filtered = smoothing.history(boundaries_s), rotation
-    if smoothing.method == "kalman":
+    if smoothing.way.conserves_momentum:
         rotation = conserve_momentum(filtered, motion, model)
     if rotation is not filtered:
         history.append("in free flight the root turns with a constant angular momentum")
@@ -208,9 +208,9 @@ def _smooth_points(
 
 
 def _require_covariances(smoothing: Smoothing, values: Array, covariance: Array) -> None:
-    """Raise ResultError where a Kalman smoother has values to smooth but no covariances."""
-    if smoothing.method == "kalman" and np.isfinite(values).any() and not np.isfinite(covariance).any():
-        raise ResultError("the run states no covariances, which the Kalman smoother needs; use a spline or Butterworth")
+    """Raise ResultError where the method needs covariances and there are values to smooth without any."""
+    if smoothing.way.needs_covariances and np.isfinite(values).any() and not np.isfinite(covariance).any():
+        raise ResultError(f"the run states no covariances, which {smoothing.method} needs; smooth in another way")
 
 
 def _position_variables(segments: SmoothedSegments, axes: tuple[str, ...], status: NDArray[np.str_]) -> dict:
