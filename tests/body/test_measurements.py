@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airborne.body import human18, human18_from_measurements, read_measurements, write_measurements
+from airborne.body import human18, human18_from_measurements, read_measurements
 from airborne.body.anthropometry import measurements_of, segment_properties
 from airborne.body.measurements import STATURE_SHARES, check_measurements
 from airborne.errors import BodyError
+from tests.support.bodies import write_measurements
 from tests.support.tolerances import EXACT, ROUNDTRIP
 
 PERSON = measurements_of(1.72, 66.0)

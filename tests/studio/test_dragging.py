@@ -7,6 +7,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from airborne.body import SAMPLED, Pose, human18
 from airborne.cameras import Rig, camera_looking_at
 from airborne.studio.dragging import Pin, drag_pose, grip_at, grip_landmark, landmarks_of_grip, landmarks_px, turn_with
+from tests.support.bodies import is_within_limits
 
 SIZE = (640, 480)
 MODEL = human18(1.75, 70.0, outfit=SAMPLED)
@@ -40,7 +41,7 @@ def test_a_wrist_goes_where_it_is_dragged_and_the_other_limbs_stay(rig, taken):
     still = [NAMES.index(name) for name in NAMES if name not in landmarks_of_grip(MODEL, grip)]
     before, after = (MODEL.with_pose(each).landmarks[still] for each in (taken, pose))
     np.testing.assert_array_equal(before, after)
-    assert MODEL.is_within_limits(pose)
+    assert is_within_limits(MODEL, pose)
 
 
 def test_a_body_taken_by_its_trunk_moves_across_the_line_of_sight_and_not_along_it(rig, taken):
@@ -80,7 +81,7 @@ def test_what_cannot_be_reached_is_approached_within_the_limits(rig, taken):
     target = np.add(start, [250.0, 0.0])
     pose = drag_pose(MODEL, taken, taken, [Pin(grip, camera, target)])
     assert abs(landmark_px(pose, camera, "wrist_left") - target).max() < abs(start - target).max()
-    assert MODEL.is_within_limits(pose)
+    assert is_within_limits(MODEL, pose)
 
 
 def test_beside_the_body_there_is_nothing_to_take(rig, taken):

@@ -8,7 +8,6 @@ import pytest
 import tomlkit
 from pydantic import BaseModel
 
-from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.cameras import Rig, camera_looking_at, write_pose2sim
 from airborne.errors import TrialError
@@ -32,6 +31,7 @@ from airborne.studio.project import (
 from airborne.studio.session import Session
 from airborne.studio.starts import read_clicked_players, read_points
 from airborne.trial.file import Trial
+from tests.support.bodies import write_measurements
 from tests.support.places import THROWN_CROSS
 
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"

@@ -5,7 +5,6 @@ import shutil
 
 import pytest
 
-from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import TrialError
 from airborne.io.folder_lock import sole_writer
@@ -15,6 +14,7 @@ from airborne.studio.project import find_trial, list_measurements, list_runs, re
 from airborne.studio.run_names import check_run_name, next_run_name
 from airborne.studio.session import Session
 from airborne.trial.file import read_trial
+from tests.support.bodies import write_measurements
 from tests.support.places import THROWN_CROSS
 
 

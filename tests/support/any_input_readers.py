@@ -14,7 +14,7 @@ from airborne import cli
 from airborne.batch.trials import list_trials
 from airborne.body import human18
 from airborne.body.files import read_body, write_body
-from airborne.body.measurements import read_measurements, write_measurements
+from airborne.body.measurements import read_measurements
 from airborne.body.mesh_files import read_mesh
 from airborne.calibration.sources.boards import read_board
 from airborne.calibration.sources.control_points import read_control_points
@@ -43,6 +43,7 @@ from tests.body.test_measurements import PERSON
 from tests.support import players_trial as players
 from tests.support.any_study import batches, clocks, studio
 from tests.support.athletes import write_results
+from tests.support.bodies import write_measurements
 from tests.support.cameras import LENS, scattered, three_cameras
 from tests.support.motions import run_with_gap
 from tests.support.places import THROWN_CROSS

@@ -1,6 +1,7 @@
 """Bodies, poses, cameras and pictures that several tests draw."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -19,7 +20,9 @@ from airborne.body import (
     surface_arrays,
 )
 from airborne.body.inertia import combine_inertias, transform_inertia
+from airborne.body.measurements import STATURE_SHARES, Measurements
 from airborne.cameras import Camera
+from airborne.geometry.rotations import matrix_from_angles
 from airborne.rendering import Lamp, Lights
 from airborne.video import View
 
@@ -116,3 +119,17 @@ def total_inertia(posed: PosedBody) -> Inertia:
     """A posed body's mass, centre of mass [m] and inertia tensor about it [kg m^2], in world axes."""
     segments = zip(posed.model.segments, posed.R, posed.t, strict=True)
     return combine_inertias([transform_inertia(segment.inertia, R, t) for segment, R, t in segments])
+
+
+def is_within_limits(model: BodyModel, pose: Pose, slack_rad: float = 1e-9) -> bool:
+    """Whether no joint of a pose lies beyond its limits by more than a slack."""
+    excess = model.limits.excess(matrix_from_angles(pose.joint_angles))
+    return bool(np.all(np.abs(excess) <= slack_rad))
+
+
+def write_measurements(path: Path, measurements: Measurements) -> None:
+    """Write a Yeadon measurement file, in metres, to the last digit."""
+    lines = ["measurementconversionfactor: 1"]
+    lines += [] if measurements.mass_kg is None else [f"totalmass: {float(measurements.mass_kg)!r}"]
+    lines += [f"{key}: {float(measurements.values_m[key])!r}" for key in STATURE_SHARES]
+    path.write_text("\n".join(lines) + "\n")

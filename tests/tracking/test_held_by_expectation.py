@@ -8,12 +8,12 @@ from scipy.spatial.transform import RigidTransform
 
 from airborne.body.chain import clamp_to_limits, joint_angles_of
 from airborne.body.sides import are_crossed
-from airborne.tracking.model_based import gauss_newton
+from airborne.tracking.model_based import gauss_newton, turned_pelvis
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.learned_regions import LearnedRegions
-from airborne.tracking.model_based.turned_pelvis import is_twisted, turn_pelvis, turn_pelvis_back
+from airborne.tracking.model_based.turned_pelvis import is_twisted, turn_pelvis_back
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import LearnedFrame
 
@@ -40,6 +40,12 @@ def judge_held(frame, fitter, wrong):
     return held, fitter.judge(held, [wrong], learned, prior)
 
 
+def turn_pelvis(pose):
+    """The poses among which a turned pelvis is looked for: the root turned about its long axis, limbs aiming alike."""
+    turns = turned_pelvis._turn(HUMAN, pose, turned_pelvis._TURNS_RAD, np.arange(len(HUMAN.segments)))
+    return turned_pelvis._poses(pose, *turns)
+
+
 def slide(pose, by_m=0.12):
     """The pose moved along the trunk."""
     root = pose.world_from_root
@@ -55,7 +61,7 @@ def test_body_that_slid_along_itself_is_found(frame, fitter):
 
 def test_turned_pelvis_leaves_the_trunk_and_where_legs_point(frame):
     before = HUMAN.with_pose(frame.truth)
-    for pose in turn_pelvis(HUMAN, frame.truth):
+    for pose in turn_pelvis(frame.truth):
         after = HUMAN.with_pose(pose)
         rest = [i for i in WHOLE if i != 0 and i not in LEGS and "foot" not in HUMAN.segments[i].name]
         np.testing.assert_allclose(after.t[rest], before.t[rest], atol=1e-12)
@@ -68,7 +74,7 @@ def test_turned_pelvis_leaves_the_trunk_and_where_legs_point(frame):
 
 
 def test_pelvis_that_is_turned_turns_back(frame, fitter):
-    held, judged = judge_held(frame, fitter, turn_pelvis(HUMAN, frame.truth)[-1])
+    held, judged = judge_held(frame, fitter, turn_pelvis(frame.truth)[-1])
     assert frame.off_mm(held.pose, LEGS) > 60
     assert frame.off_mm(judged.fit.pose, LEGS) < 10
 
@@ -76,7 +82,7 @@ def test_pelvis_that_is_turned_turns_back(frame, fitter):
 def test_pelvis_turns_back_though_no_step_leads_there(frame, fitter, monkeypatch):
     monkeypatch.setattr(gauss_newton, "_MOST_STEPS", 1)
     monkeypatch.setattr(Fitter, "fit_silhouettes", lambda fitter, pose, learned, levels, prior: pose)
-    held, judged = judge_held(frame, fitter, turn_pelvis(HUMAN, frame.truth)[-1])
+    held, judged = judge_held(frame, fitter, turn_pelvis(frame.truth)[-1])
     assert frame.off_mm(held.pose, LEGS) > 60
     assert frame.off_mm(judged.fit.pose, LEGS) < 20
 

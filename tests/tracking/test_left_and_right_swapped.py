@@ -6,6 +6,7 @@ import pytest
 from airborne.body import Pose
 from airborne.body.chain import move_pose
 from airborne.tracking.model_based.left_right_swap import is_nearer, swap_limbs
+from tests.support.bodies import is_within_limits
 from tests.support.people import HUMAN, mean_errors_mm, person, swinging, tracker, wrong
 from tests.support.scenes import CROSS, FIGURE, standing, statuses, thrown, track
 from tests.support.tolerances import EXACT, ROUNDTRIP
@@ -50,7 +51,7 @@ def test_legs_swapped_twice_are_where_they_were(time_s):
 
 @pytest.mark.parametrize("swap", [0, 1])
 def test_swapped_pose_is_within_the_limits(swap):
-    assert HUMAN.is_within_limits(swap_limbs(HUMAN, TRUTH)[swap])
+    assert is_within_limits(HUMAN, swap_limbs(HUMAN, TRUTH)[swap])
 
 
 def test_truth_is_nearer_than_its_swap_by_more_than_the_margin():

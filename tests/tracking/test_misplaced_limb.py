@@ -17,6 +17,7 @@ from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.misplaced_limbs import find_misplaced_limbs, search_limb
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.tracker import step
+from tests.support.bodies import is_within_limits
 from tests.support.people import HUMAN, mean_errors_mm, person, tracker
 from tests.support.scenes import statuses, track
 
@@ -105,7 +106,7 @@ def test_search_for_a_limb_brings_it_near_and_moves_nothing_else(frame, name):
     others = np.setdiff1d(np.arange(len(HUMAN.segments)), limb)
     for pose in poses:
         np.testing.assert_array_equal(HUMAN.with_pose(pose).t[others], HUMAN.with_pose(wrong).t[others])
-        assert HUMAN.is_within_limits(pose)
+        assert is_within_limits(HUMAN, pose)
 
 
 @pytest.mark.parametrize("name", FOLDS)

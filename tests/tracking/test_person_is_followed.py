@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.support.bodies import is_within_limits
 from tests.support.people import HUMAN, mean_errors_mm, person, tracker, wrong
 from tests.support.scenes import statuses, track
 
@@ -19,7 +20,7 @@ def test_every_order_of_fitting_finds_the_person_from_a_start_three_degrees_off(
     assert mean_errors_mm(SCENE, estimates).max() < 5.0
     for estimate in estimates:
         assert estimate.n_views == 3
-        assert HUMAN.is_within_limits(estimate.pose, slack_rad=np.radians(3.0))
+        assert is_within_limits(HUMAN, estimate.pose, slack_rad=np.radians(3.0))
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from airborne.body import write_measurements
 from airborne.body.anthropometry import measurements_of
 from airborne.errors import MistakesError, TrialError
 from airborne.geometry.rotations import matrix_from_angles
 from airborne.trial.file import read_trial
+from tests.support.bodies import write_measurements
 from tests.support.tolerances import EXACT
 
 GOOD = """

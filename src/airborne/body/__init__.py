@@ -2,7 +2,7 @@
 
 from airborne.body.human import human18, human18_from_measurements
 from airborne.body.inverse_kinematics import PoseFit, fit_lengths, fit_pose
-from airborne.body.measurements import Measurements, read_measurements, write_measurements
+from airborne.body.measurements import Measurements, read_measurements
 from airborne.body.model import (
     BodyModel,
     Box,
@@ -48,5 +48,4 @@ __all__ = [
     "surface_of_segments",
     "with_girths",
     "with_segment_lengths",
-    "write_measurements",
 ]

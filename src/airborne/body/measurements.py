@@ -10,7 +10,6 @@ from pathlib import Path
 
 from airborne.errors import BodyError
 from airborne.io.text import read_flat_yaml
-from airborne.io.writing import write_text
 
 # Shares of stature. Levels of the trunk are measured from the hip joint centres, of the head from the acromion, of the
 # arm from the shoulder, of the hand from the wrist, of the leg from the hip, of the foot from the ankle: L length,
@@ -151,14 +150,6 @@ def read_measurements(path: Path) -> Measurements:
         return check_measurements(Measurements(path.stem, values, mass_kg if mass_kg > 0 else None))
     except BodyError as error:
         raise BodyError(f"{path.name}: {error}") from error
-
-
-def write_measurements(path: Path, measurements: Measurements) -> None:
-    """Write a Yeadon measurement file, in metres, to the last digit."""
-    lines = ["measurementconversionfactor: 1"]
-    lines += [] if measurements.mass_kg is None else [f"totalmass: {float(measurements.mass_kg)!r}"]
-    lines += [f"{key}: {float(measurements.values_m[key])!r}" for key in STATURE_SHARES]
-    write_text(path, "\n".join(lines) + "\n")
 
 
 def check_measurements(measurements: Measurements) -> Measurements:

@@ -13,7 +13,6 @@ from airborne.body.kinematics import chain_segments
 from airborne.body.limits import FREE, JointLimits
 from airborne.errors import BodyError, count
 from airborne.geometry.joint_rotations import move_matrix
-from airborne.geometry.rotations import matrix_from_angles
 from airborne.io.names import check_column, check_name
 from airborne.types import Array
 
@@ -214,11 +213,6 @@ class BodyModel:
     def limits(self) -> JointLimits:
         """The limits of every joint, stacked: (segments - 1)."""
         return JointLimits.stack(segment.limits for segment in self.segments[1:])
-
-    def is_within_limits(self, pose: Pose, slack_rad: float = 1e-9) -> bool:
-        """Whether no joint of a pose lies beyond its limits by more than a slack."""
-        excess = self.limits.excess(matrix_from_angles(pose.joint_angles)) if pose.joint_angles.size else np.zeros(1)
-        return bool(np.all(np.abs(excess) <= slack_rad))
 
     def index_of(self, segment: str) -> int:
         """Return a segment's index; raises BodyError for a name that is not there."""

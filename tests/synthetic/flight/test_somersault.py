@@ -25,6 +25,7 @@ from airborne.synthetic.throw.pictures import background, linear_image
 from airborne.trial.file import read_trial
 from airborne.video import open_recording
 from airborne.video.decoding import VideoSource
+from tests.support.bodies import is_within_limits
 from tests.support.synthetic import constant_joints, pose_ranges
 from tests.support.tolerances import EXACT, ROUNDTRIP, SOLVED
 
@@ -247,7 +248,7 @@ def test_trial_starts_off_by_the_errors_of_the_scene_and_within_the_limits(writt
     off = np.degrees(geodesic(matrix_from_angles(start.joint_angles), matrix_from_angles(true.joint_angles)))
     assert np.all(off < 3.0 + 1e-6)
     assert np.median(off) > 2.9  # limits hold back a few
-    assert MODEL.is_within_limits(start)
+    assert is_within_limits(MODEL, start)
     lights = trial.lights.lights
     assert lights.ambient == scene.lights.ambient
     for lamp, given in zip(lights.lamps, scene.lights.lamps, strict=True):

@@ -29,11 +29,6 @@ _AT_LIMIT_RAD = np.radians(1.0)  # a joint with less slack lies at its limit: it
 _FEWEST_AT_LIMIT = 2  # joints of the trunk: a single one often is, in tucks of two recorded somersaults
 
 
-def turn_pelvis(model: BodyModel, pose: Pose) -> list[Pose]:
-    """Return poses with the root turned about its long axis; limbs on it aim where they did, nothing else moves."""
-    return _poses(pose, *_turn(model, pose, _TURNS_RAD, np.arange(len(model.segments))))
-
-
 def find_turned_pelvis(render_model: RenderModel, pose: Pose, maps: EvidenceMaps) -> list[Pose]:
     """Return the pose with its pelvis turned, if that has more evidence on reduced images or the pose is improbable."""
     model, root = render_model.model, pose.world_from_root
