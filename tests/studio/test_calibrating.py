@@ -81,7 +81,7 @@ def test_sources_name_the_cameras_as_the_trial_looks_for_them(project):
     path = project.folder / "sources.toml"
     path.write_text(sources_text(project, {"board": {"file": "board.toml"}}, videos))
     sources = read_sources(path)
-    assert (sources.names, sources.kinds) == (["left", "R"], ["board"])
+    assert (sources.names, list(sources.tables)) == (["left", "R"], ["board"])
     wand = {"wand": {"file": "wand.csv", "length_m": 0.5}}
     text = sources_text(project, wand, {name: {"size": [640, 480]} for name in videos})
     assert tomllib.loads(text)["camera"][1] == {"name": "R", "size": [640, 480]}

@@ -120,7 +120,7 @@ def _adjust(
 ) -> Adjustment:
     sources = _sources(inputs, rig, lag_sd_s)
     prior = None
-    if inputs.start_rig is not None and inputs.sources.kinds == ["detections"]:
+    if inputs.start_rig is not None and not inputs.sources.place_cameras:
         prior = calibration_prior(
             rig, [c.name for c, old in zip(rig, inputs.rig, strict=True) if c is old], sources[0].points
         )
@@ -142,7 +142,7 @@ def _sources(inputs: Inputs, rig: Rig, lag_sd_s: float | None) -> list[Source]:
         sources.append(source)
     for name, views in inputs.lens_views.items():
         world_from_board = board_poses(rig.select([name]), views)
-        sources.append(board_source(views, world_from_board, name=f"lens of {name}", rows=[rig.names.index(name)]))
+        sources.append(board_source(views, world_from_board, lens_of=name, rows=[rig.names.index(name)]))
     if inputs.wand is not None:
         sources.append(wand_source(rig, inputs.wand))
     if inputs.detections is not None:
@@ -168,12 +168,14 @@ def _lag_sd_s(inputs: Inputs) -> float | None:
 
 def _is_looser_better(without_lags: Adjustment, with_lags: Adjustment, progress: StageProgress) -> bool:
     """Say whether lags come to rest, clearly lower the board's noise, and predict left-out moments as well."""
-    row = [source.name for source in with_lags.sources].index("board")
+    row = with_lags.target_row
     noise_share = with_lags.noise_px[row] / without_lags.noise_px[row]
     if not with_lags.has_converged or noise_share >= _LOOSE_SYNC_NOISE_SHARE:
         return False
     held_out = [
-        cross_validate(adjustment, lambda done, n: progress("comparing the clocks", done, n))["board"]
+        cross_validate(adjustment, lambda done, n: progress("comparing the clocks", done, n))[
+            with_lags.sources[row].name
+        ]
         for adjustment in (without_lags, with_lags)
     ]
     exact, loose = (float(np.sqrt(np.nanmean(distances**2))) for distances in held_out)
@@ -184,11 +186,9 @@ def _adjust_in_world(adjustment: Adjustment, frame: WorldFrame, progress: StageP
     """Transform everything to the requested world frame, and estimate the standard deviations there."""
     rig, sources = adjustment.transform(frame.new_from_old, frame.scale)
     if frame.fixed_moment is not None:
-        updated = [
-            replace(s, is_fixed=np.arange(s.n_moments) == frame.fixed_moment) if s.name == "board" else s
-            for s in sources
-        ]
-        sources = tuple(updated)
+        row, fixed = adjustment.target_row, list(sources)
+        fixed[row] = replace(fixed[row], is_fixed=np.arange(fixed[row].n_moments) == frame.fixed_moment)
+        sources = tuple(fixed)
     free = dict(adjustment.free)
     if frame.fixed_camera is not None:
         free[frame.fixed_camera] = replace(free[frame.fixed_camera], extrinsics=False)
@@ -217,7 +217,7 @@ def _with_wider_errors(rig: Rig, factors: Array) -> Rig:
 
 def _lags(adjustment: Adjustment) -> dict[str, Array]:
     """Return each camera's lags, one an image of the moving board."""
-    row = [source.name for source in adjustment.sources].index("board")
+    row = adjustment.target_row
     source, lag_s = adjustment.sources[row], adjustment.lag_s[row]
     lags = {}
     for i, name in enumerate(adjustment.rig.names):

@@ -145,13 +145,13 @@ def calibration_warnings(calibration: RigCalibration, *, is_misfit: bool) -> tup
                 f"{share:.0%} of source '{source.name}' fit nothing: it contradicts others, is of other cameras, or "
                 "has points exchanged in some of them"
             )
-    kinds, of_points = {source.name for source in calibration.adjustment.sources}, set(calibration.inputs.points)
+    are_surveyed = [source.is_surveyed for source in calibration.adjustment.sources]
     rms_px, held_out_px = calibration.adjustment.rms_px(), calibration.held_out_rms_px
     if held_out_px > _SUSPECT_RATIO * rms_px:
         sentences.append(
             f"what is left out of the fit lies {held_out_px / rms_px:.1f} times as far from its prediction as what is "
             "in it: the standard deviations, here and in the calibration file, are enlarged by it; "
-            + (_MORE_POINTS if kinds <= of_points else "record more poses, slower, in every corner")
+            + (_MORE_POINTS if all(are_surveyed) else "record more poses, slower, in every corner")
         )
     places = [each.name for each in calibration.rig if _place_sd_m(_sds(calibration, each)) > _OPEN_SD_M]
     if places and not is_misfit:  # else a wrong point, and no lacking one, leaves them open
@@ -160,7 +160,7 @@ def calibration_warnings(calibration: RigCalibration, *, is_misfit: bool) -> tup
         stand = f"where {', '.join(places)} stand{'s' if len(places) == 1 else ''}{of_start}"
         sentences.append(
             f"the points show {stand} to no better than {_OPEN_SD_M:g} m; {_MORE_POINTS}"
-            if of_points
+            if any(are_surveyed)
             else f"no source shows {stand}; add control points, a wand, a court or a board that several cameras see"
         )
     return tuple(sentences)

@@ -12,9 +12,10 @@ from tests.support.calibration_scenes import three_side_by_side
 RIG = three_side_by_side()
 
 
-def calibration(rms_px, name="board") -> Any:
+def calibration(rms_px, name="board", *, is_object=True) -> Any:
     adjustment = SimpleNamespace(
-        sources=[SimpleNamespace(name=name)], rms_px=lambda *, source, camera: np.array(rms_px)[camera]
+        sources=[SimpleNamespace(name=name, is_object=is_object)],
+        rms_px=lambda *, source, camera: np.array(rms_px)[camera],
     )
     return SimpleNamespace(adjustment=adjustment, rig=RIG)
 
@@ -32,4 +33,4 @@ def test_nothing_is_said_of_errors_that_are_small_or_everywhere(rms_px):
 
 
 def test_nothing_is_said_of_clicked_points_here():
-    assert not list(_check_objects(calibration([0.7, 9.6, 1.1], "court")))
+    assert not list(_check_objects(calibration([0.7, 9.6, 1.1], "court", is_object=False)))

@@ -48,7 +48,7 @@ def test_every_table_has_a_section():
 
 def test_examples_of_the_page_are_valid():
     blocks = re.findall(r"^```toml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
-    given = [Sources.model_validate(tomllib.loads(block)).kinds for block in blocks]
+    given = [list(Sources.model_validate(tomllib.loads(block)).tables) for block in blocks]
     assert given == [["board", "court"], ["detections"]]
 
 

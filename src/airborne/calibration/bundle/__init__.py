@@ -18,6 +18,8 @@ comes an `Adjustment`: the rig, every free point and target, residuals, standard
 - `cluster`: a number by observation; those with the same number have correlated errors (all corners of one board view,
   a joint that a network detects with a constant bias). Standard deviations then count clusters, not observations.
 
+- `is_surveyed`, `is_object`, `is_of_lens`: what checks and reports ask of a source, whose name they do not know.
+
 Pixels are those of the calibration's images, (0, 0) the centre of the top-left pixel; metres; radians.
 Without known world points the world frame is a gauge freedom: it stays, as a whole, where the initial rig has it, and
 so does the scale unless a target or a length fixes it. Map the result with `Adjustment.transform` afterwards.

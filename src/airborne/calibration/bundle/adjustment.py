@@ -42,6 +42,11 @@ class Adjustment:
     is_gauge_free: bool  # nothing fixes the world: standard deviations are relative to the rig
     has_converged: bool  # False: stopped at the limit of steps
 
+    @property
+    def target_row(self) -> int:
+        """The row of the source that is a moving target seen by all cameras, as a board is; there must be one."""
+        return next(i for i, s in enumerate(self.sources) if s.world_from_target is not None and not s.is_of_lens)
+
     def rms_px(self, *, source: int | None = None, camera: int | None = None) -> float:
         """Return the RMS distance of a source's, a camera's or all observations [px], unweighted."""
         rows = [

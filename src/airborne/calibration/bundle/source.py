@@ -96,6 +96,9 @@ class Source:
     lengths: Lengths | None = None
     lags: ObservationLags | None = None
     n_rejected: int = 0  # observations beside these, left out beforehand as they contradict one another
+    is_surveyed: bool = False  # clicked points whose places in the world are known
+    is_object: bool = False  # something moved about that is found in images, to a pixel or better
+    is_of_lens: bool = False  # recorded by one camera alone, for its lens
 
     def __post_init__(self) -> None:
         n, p, m = len(self.px), len(self.points), self.n_moments

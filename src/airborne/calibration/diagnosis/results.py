@@ -19,7 +19,6 @@ from airborne.cameras.units import check_baselines
 from airborne.types import Array
 
 _UP = np.array([0.0, 0.0, 1.0])  # the world's z
-_OBJECTS = ("board", "wand")  # sources that are found in the images, to a pixel or better
 _MISFIT_TIMES = 3.0  # chosen: a camera that an object fits so many times worse than most
 _MISFIT_PX, _MISFIT_SHARE = 4.0, 0.002  # RMS of clicked points; share of the images' longer sides
 
@@ -28,7 +27,7 @@ def diagnose(calibration: RigCalibration) -> tuple[Finding, ...]:
     """Return everything that is wrong, the most serious first; empty for a good recording."""
     inputs, rig = calibration.inputs, calibration.rig
     is_level = bool(inputs.points) or inputs.sources.world.points is not None
-    below = check_floor(rig) if "court" in inputs.points else []
+    below = check_floor(rig) if any(table.is_court for table in inputs.sources.tables.values()) else []
     checks = [
         inputs.findings,
         _check_swapped_files(calibration),
@@ -50,13 +49,14 @@ def diagnose(calibration: RigCalibration) -> tuple[Finding, ...]:
 
 def _check_clicks(calibration: RigCalibration) -> Iterator[Finding]:
     """Report clicked points that fit much worse than clicks are accurate."""
-    adjusted, sides = calibration.adjustment, [max(camera.size) for camera in calibration.rig]
+    adjusted, tables = calibration.adjustment, calibration.inputs.sources.tables
+    sides = [max(camera.size) for camera in calibration.rig]
     most_px = max(_MISFIT_PX, _MISFIT_SHARE * float(np.mean(sides)))
     for i, source in enumerate(adjusted.sources):
         rms_px = adjusted.rms_px(source=i)
-        if source.name not in calibration.inputs.points or rms_px <= most_px:
+        if not source.is_surveyed or rms_px <= most_px:
             continue
-        of_net = source.name == "court" and check_net(
+        of_net = tables[source.name].is_court and check_net(
             calibration.rig, calibration.inputs.points[source.name], most_px=most_px
         )
         if of_net:
@@ -74,7 +74,7 @@ def _check_objects(calibration: RigCalibration) -> Iterator[Finding]:
     adjusted, cameras = calibration.adjustment, calibration.rig.cameras
     for i, source in enumerate(adjusted.sources):
         rms_px = np.array([adjusted.rms_px(source=i, camera=c) for c in range(len(cameras))])
-        if source.name not in _OBJECTS or np.isnan(rms_px).all():
+        if not source.is_object or np.isnan(rms_px).all():
             continue
         usual_px = float(np.nanmedian(rms_px))
         for camera, own_px in zip(cameras, rms_px, strict=True):
@@ -150,7 +150,7 @@ def _check_lens_views(calibration: RigCalibration) -> Iterator[Finding]:
             continue
         for c, camera in enumerate(calibration.rig):
             if camera.name not in calibration.inputs.lenses or (
-                source.name == "board" and camera.name in calibration.inputs.lens_views
+                not source.is_of_lens and camera.name in calibration.inputs.lens_views
             ):
                 continue
             moments = np.unique(
@@ -170,7 +170,7 @@ def _check_rolling_shutter(calibration: RigCalibration) -> Iterator[Finding]:
     board = calibration.inputs.board_detections
     if board is None or board.time_s is None or calibration.lag_s or len(board.time_s) < 3:
         return
-    row = [source.name for source in calibration.adjustment.sources].index("board")
+    row = calibration.adjustment.target_row
     source, residual = calibration.adjustment.sources[row], calibration.adjustment.residual_px[row]
     px = _board_px(board.views, calibration.rig.names)
     velocity = np.gradient(px, board.time_s, axis=0)

@@ -62,11 +62,12 @@ class Views:
 
 
 def board_source(
-    views: Views, world_from_board: RigidTransform, *, name: str = "board", rows: Sequence[int] | None = None
+    views: Views, world_from_board: RigidTransform, *, lens_of: str = "", rows: Sequence[int] | None = None
 ) -> Source:
     """Return the views as a source, the targets' initial poses `world_from_board` (moments,).
 
-    rows: the rig's row of each camera of the views; None: they are the rig's cameras.
+    lens_of: the camera whose lens alone they are for. rows: the rig's row of each camera of the views; None: they are
+    the rig's cameras.
     """
     columns = [
         (np.full(len(s.corner), c), s.corner, np.full(len(s.corner), m), s.px)
@@ -75,7 +76,7 @@ def board_source(
     ]
     camera, point, moment = (np.concatenate([row[i] for row in columns]).astype(int) for i in range(3))
     return Source(
-        name=name,
+        name=f"lens of {lens_of}" if lens_of else "board",
         camera=camera,
         point=point,
         moment=moment,
@@ -83,6 +84,8 @@ def board_source(
         points=views.board.corners,
         world_from_target=world_from_board,
         cluster=moment,
+        is_object=True,
+        is_of_lens=bool(lens_of),
     )
 
 

@@ -15,8 +15,7 @@ from airborne.calibration.intrinsics.lens_selection import LENS_MODELS, LensFit,
 from airborne.calibration.sources.board_detection import BoardDetections, detect_boards, detect_lens_board, image_size
 from airborne.calibration.sources.boards import Board, board_from_table, read_board
 from airborne.calibration.sources.control_points import ControlPoints, read_control_points
-from airborne.calibration.sources.court import court_points
-from airborne.calibration.sources.files import CameraSource, Sources
+from airborne.calibration.sources.files import CameraSource, Sources, SurveyTable
 from airborne.calibration.sources.scene_points import initial_rig_from_points
 from airborne.calibration.sources.wand import WandTracks
 from airborne.calibration.sources.wand_detection import find_wand
@@ -51,7 +50,7 @@ class Inputs:
     @property
     def are_surveyed_points(self) -> bool:
         """Whether there is nothing but points of exactly known places."""
-        return len(self.points) == len(self.sources.kinds) and all(each.sd_m is None for each in self.points.values())
+        return len(self.points) == len(self.sources.tables) and all(each.sd_m is None for each in self.points.values())
 
 
 def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
@@ -103,7 +102,7 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     starts = list(start_of.values())
     if board_detections is not None:
         starts += _board_starts(
-            board_detections.views, known_lenses, alone_is_enough=sources.kinds == ["board"] and start_rig is None
+            board_detections.views, known_lenses, alone_is_enough=len(sources.tables) == 1 and start_rig is None
         )
     starts = [start for start in starts if len(start)]
     if not starts:
@@ -253,11 +252,11 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
 
 def _read_points(sources: Sources, sizes: dict[str, tuple[int, int]]) -> dict[str, ControlPoints]:
     """Read the points of known places; raises CalibrationError where one lies outside its image."""
-    points = {}
-    if sources.control_points is not None:
-        points["control points"] = read_control_points(sources.path(sources.control_points.file))
-    if sources.court is not None:
-        points["court"] = read_control_points(sources.path(sources.court.file), court_points(sources.court.net))
+    points = {
+        name: read_control_points(sources.path(table.file), table.scene_points())
+        for name, table in sources.tables.items()
+        if isinstance(table, SurveyTable)
+    }
     for table in points.values():
         for camera in _common(table.cameras, sizes):
             check_inside(table, camera, sizes)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
+from airborne.calibration.sources.court import ScenePoint, court_points
 from airborne.cameras import PixelConvention
 from airborne.errors import CalibrationError, one_line
 from airborne.io.names import CheckedPath, Name
@@ -44,9 +45,28 @@ class StartSource(_Strict):
     file: CheckedPath
 
 
-class BoardSource(_Strict):
+class SourceTable(_Strict):
+    """A source's table: what it tells of cameras is asked of it, not of its kind."""
+
+    places_cameras: ClassVar[bool] = True  # it says where cameras stand, without others' initial values
+    has_lengths: ClassVar[bool] = False  # lengths on it are known, so that a world of another scale is no option
+    is_court: ClassVar[bool] = False  # z = 0 is a floor, over which a net stands
+
+
+class SurveyTable(SourceTable):
+    """Clicked points whose places in the world are known."""
+
+    file: CheckedPath
+
+    def scene_points(self) -> dict[str, ScenePoint]:
+        """Return the points whose places are known by their names alone."""
+        return {}
+
+
+class BoardSource(SourceTable):
     """A printed board that is moved about."""
 
+    has_lengths: ClassVar[bool] = True
     file: CheckedPath | None = None
     kind: Literal["charuco", "chessboard"] | None = None  # these, or a file with them
     columns: int | None = None
@@ -68,22 +88,25 @@ class BoardSource(_Strict):
         return self
 
 
-class PointsSource(_Strict):
+class PointsSource(SurveyTable):
     """Points with surveyed positions."""
 
-    file: CheckedPath
 
-
-class CourtSource(_Strict):
+class CourtSource(SurveyTable):
     """Clicked points of a volleyball court and net."""
 
-    file: CheckedPath
+    is_court: ClassVar[bool] = True
     net: Literal["men", "women"] | Positive = "men"
 
+    def scene_points(self) -> dict[str, ScenePoint]:
+        """Return the named points of the court, with this net."""
+        return court_points(self.net)
 
-class WandSource(_Strict):
+
+class WandSource(SourceTable):
     """A stick of known length that is waved about; without a file it is looked for in the cameras' videos."""
 
+    has_lengths: ClassVar[bool] = True
     file: CheckedPath | None = None
     length_m: Positive | None = None
     lengths_m: list[Positive] | None = None
@@ -99,9 +122,10 @@ class WandSource(_Strict):
         return self
 
 
-class DetectionsSource(_Strict):
+class DetectionsSource(SourceTable):
     """Keypoints of a moving person, detected by a pose network."""
 
+    places_cameras: ClassVar[bool] = False
     file: CheckedPath
     cameras: dict[str, str] = {}
     skeleton: str | None = None  # whose points they are; None: as the file says
@@ -149,10 +173,11 @@ class Sources(_Strict):
         names = self.names
         if len(set(names)) < len(names):
             raise ValueError(f"two cameras share a name: {', '.join(names)}; give each its own")
-        if self.detections is not None and self.start is None and len(self.kinds) < 2:
-            raise ValueError('detections refine cameras that are known: give [start] file = "..." or another source')
-        if not self.kinds:
-            raise ValueError("no source: add [board], [control_points], [court], [wand] or [detections]")
+        if not self.tables:
+            raise ValueError(f"no source: add {_names_of_tables()}")
+        if self.start is None and not self.place_cameras:
+            refining = " and ".join(self.tables)
+            raise ValueError(f'{refining} refine cameras that are known: give [start] file = "..." or another source')
         return self
 
     @property
@@ -161,14 +186,29 @@ class Sources(_Strict):
         return [camera.name for camera in self.camera]
 
     @property
-    def kinds(self) -> list[str]:
-        """The kinds of sources in the file."""
-        kinds = ("board", "control_points", "court", "wand", "detections")
-        return [kind for kind in kinds if getattr(self, kind) is not None]
+    def tables(self) -> dict[str, SourceTable]:
+        """The sources that are given, by what they are called."""
+        given = {name.replace("_", " "): getattr(self, name) for name in type(self).model_fields}
+        return {name: table for name, table in given.items() if isinstance(table, SourceTable)}
+
+    @property
+    def place_cameras(self) -> bool:
+        """Whether any source says where cameras stand."""
+        return any(table.places_cameras for table in self.tables.values())
 
     def path(self, name: str) -> Path:
         """Return the path of a file named here."""
         return self._folder / name
+
+
+def _names_of_tables() -> str:
+    """Name the tables that a source can have: [board], [control_points], ... or [detections]."""
+    names = [
+        f"[{name}]"
+        for name, field in Sources.model_fields.items()
+        if any(isinstance(kind, type) and issubclass(kind, SourceTable) for kind in get_args(field.annotation))
+    ]
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def pixel_convention(name: PixelConventionName) -> PixelConvention:
@@ -194,8 +234,7 @@ def sources_from(document: dict, folder: Path, where: str) -> Sources:
     """Check the tables; relative paths count from the folder. Raises CalibrationError, naming `where`."""
     if "camera" not in document or "body" in document:
         raise CalibrationError(
-            f"{where} is not a sources file: expected [[camera]] and [board], [control_points], [court], [wand] or "
-            f"[detections] (found {list_keys(document)})"
+            f"{where} is not a sources file: expected [[camera]] and {_names_of_tables()} (found {list_keys(document)})"
         )
     try:
         sources = Sources.model_validate(document)

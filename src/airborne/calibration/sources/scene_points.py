@@ -79,6 +79,7 @@ def scene_source(rig_names: Sequence[str], points: ControlPoints, *, name: str) 
         points=np.concatenate([world, anchors]),
         is_free=np.concatenate([is_free, np.zeros(anchors.shape, bool)]) if len(anchors) else None,
         lengths=ties if len(anchors) else None,
+        is_surveyed=True,
     )
 
 

@@ -139,6 +139,7 @@ def wand_source(rig: Rig, tracks: WandTracks) -> Source:
         sd_px=0.5,
         lengths=_lengths(tracks, index_of_point),
         n_rejected=int((is_seen & ~is_used).sum()),
+        is_object=True,
     )
 
 

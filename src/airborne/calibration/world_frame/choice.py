@@ -69,7 +69,7 @@ def _has_only_board(inputs: Inputs) -> bool:
 def _frame_by_board(inputs: Inputs, adjustment: Adjustment) -> WorldFrame:
     if inputs.board_detections is None:
         raise CalibrationError('[world] frame = "board" needs a board that the cameras see together')
-    source = next(source for source in adjustment.sources if source.name == "board")
+    source = adjustment.sources[adjustment.target_row]
     n_corners = inputs.board_detections.views.n_corners
     moment = inputs.sources.world.moment
     if moment is None:
@@ -91,7 +91,7 @@ def _frame_by_start(inputs: Inputs, adjustment: Adjustment, misplaced: Sequence[
         raise CalibrationError('[world] frame = "start" needs [start] file = "..."')
     trusted = [name for name in inputs.start_rig.names if name not in misplaced]
     transform, scale = align_rigs(adjustment.rig, inputs.start_rig, trusted)
-    has_scale = bool({"board", "wand"} & set(inputs.sources.kinds))
+    has_scale = any(table.has_lengths for table in inputs.sources.tables.values())
     if has_scale:
         transform, scale = align_rigs(adjustment.rig, inputs.start_rig, trusted, fits_scale=False)
     description = f"as {_start_file(inputs)} has it, by {', '.join(trusted)}"
