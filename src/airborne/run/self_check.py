@@ -21,7 +21,7 @@ from airborne.tracking.model_based.status import UNCERTAIN_SD_M
 from airborne.tracking.self_check.check import SelfCheck, doubts, gather_equations, self_check
 from airborne.tracking.self_check.free_flight import WrongFall, fall, find_wrong_flight
 from airborne.tracking.self_check.kept_frames import KeptFrames
-from airborne.tracking.self_check.nuisances import MEASURED_SD, ONE_CAMERA_SD, PRESET_SD
+from airborne.tracking.self_check.nuisances import MEASURED_SD, ONE_CAMERA_SD, PRESET_SD, columns_of
 from airborne.tracking.self_check.path import TrackedPath
 from airborne.tracking.self_check.reach import FarReach, doubtful_joints, find_far_reach
 from airborne.tracking.self_check.roughness import PathFinding, find_wrong_path, measure_roughness
@@ -136,7 +136,8 @@ def check_run(
         wrong += [each for each in (of_path, of_flight) if each is not None]
         is_measured = of_flight is not None or fall(*flight) is not None
         if of_flight is None and len(rig) == 1 and found is not None:
-            sd = np.sqrt(found.diagnosis.covariance[0, 0])
+            size = columns_of(rig)["body", "scale"]
+            sd = np.sqrt(found.diagnosis.covariance[size, size]).item()
             measured = f"here to {100 * sd:.1f} %" if is_measured else "and none was measured"
             sentences.append(_SIZE_OF_ONE_VIEW.format(measured=measured))
         if not is_measured and len(motion) > 1:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -20,7 +21,6 @@ from airborne.types import Array
 Kind = Literal["scale", "turn_deg", "shift_m", "focal", "time_s", "drift_s"]
 
 _KINDS_OF_CAMERA: tuple[tuple[Kind, int], ...] = (("turn_deg", 3), ("shift_m", 3), ("focal", 1), ("time_s", 1))
-_PER_CAMERA = 8  # numbers of the kinds above
 # sds of what is usual: of a body measured or fitted, of one by its stature alone, of a world, of other cameras
 MEASURED_SD, PRESET_SD = 0.01, 0.03  # shares of the size
 # the same of a thing that one camera sees, whose distance is as wrong as its file's size; chosen, and looked at on
@@ -66,9 +66,19 @@ def nuisances_of(rig: Rig) -> list[Nuisance]:
     return listed
 
 
+def columns_of(rig: Rig) -> dict[tuple[str, Kind], slice]:
+    """Return the places of all causes among the parameters, by subject and kind."""
+    return {(each.subject, each.kind): each.columns for each in nuisances_of(rig)}
+
+
+def first_bias(rig: Rig) -> int:
+    """Return the first of the parameters that are no causes: what each view's silhouette is off all run long."""
+    return nuisances_of(rig)[-1].columns.stop
+
+
 def n_parameters(rig: Rig) -> int:
     """Count the parameters: the causes' and, after them, what each view's silhouette is off all run long."""
-    return 2 + (_PER_CAMERA + N_SIMILARITY) * len(rig)
+    return first_bias(rig) + N_SIMILARITY * len(rig)
 
 
 def twists(rig: Rig, camera_index: int, root: Array, velocity: Array) -> Array:
@@ -77,12 +87,17 @@ def twists(rig: Rig, camera_index: int, root: Array, velocity: Array) -> Array:
     root (3,) [m], velocity (6,) [m/s, rad/s] of the body. Parameters say how the truth differs from the file: a scale,
     focal length or body that is larger, a camera that is turned or stands further along its own axes, a later time.
     """
-    camera = rig.cameras[camera_index]
+    camera, at = rig.cameras[camera_index], columns_of(rig)
     P = np.zeros((6, n_parameters(rig)))
-    P[:3, 0] = camera.centre - root
-    P[:3, 1] = -camera.centre
-    first = 2 + _PER_CAMERA * camera_index
-    P[:, first : first + _PER_CAMERA] = _camera_twists(camera, root, velocity)
+    P[:3, at["body", "scale"]] = (camera.centre - root)[:, None]
+    P[:3, at["world", "scale"]] = -camera.centre[:, None]
+    world_from_camera = camera.camera_from_world.rotation.as_matrix().T
+    arm, axis = root - camera.centre, world_from_camera[:, 2]
+    P[:3, at[camera.name, "turn_deg"]] = np.cross(world_from_camera.T, arm).T
+    P[3:, at[camera.name, "turn_deg"]] = world_from_camera
+    P[:3, at[camera.name, "shift_m"]] = -world_from_camera
+    P[:3, at[camera.name, "focal"]] = -(axis @ arm) * axis[:, None]
+    P[:, at[camera.name, "time_s"]] = velocity[:, None]
     return P
 
 
@@ -103,24 +118,6 @@ def shift_covariance(rig: Rig) -> Array:
     return np.diag(variance)
 
 
-def first_bias(rig: Rig) -> int:
-    """Return the first of the parameters that are no causes: what each view's silhouette is off all run long."""
-    return 2 + _PER_CAMERA * len(rig)
-
-
-def _camera_twists(camera: Camera, root: Array, velocity: Array) -> Array:
-    world_from_camera = camera.camera_from_world.rotation.as_matrix().T
-    arm = root - camera.centre
-    columns = np.zeros((6, _PER_CAMERA))
-    columns[:3, :3] = np.cross(world_from_camera.T, arm).T
-    columns[3:, :3] = world_from_camera
-    columns[:3, 3:6] = -world_from_camera
-    axis = world_from_camera[:, 2]
-    columns[:3, 6] = -(axis @ arm) * axis
-    columns[:, 7] = velocity
-    return columns
-
-
 def prior_covariance(rig: Rig, body_sd: float, *, is_person: bool) -> Array:
     """Return the covariance (n_parameters, n_parameters) of what is usual; it may be singular.
 
@@ -128,18 +125,17 @@ def prior_covariance(rig: Rig, body_sd: float, *, is_person: bool) -> Array:
     they say; any other may be larger about the cameras' middle. Where not all cameras say anything, their common
     motion counts for nothing there: poses are in their world. That goes for the place of its origin, too.
     """
-    covariance = np.zeros((n_parameters(rig),) * 2)
-    covariance[0, 0], covariance[1, 1] = body_sd**2, (rig.world_sd or _WORLD_SD) ** 2
-    usual = np.repeat([_CAMERA_SD[kind] for kind, _ in _KINDS_OF_CAMERA], [n for _, n in _KINDS_OF_CAMERA])
-    for i, camera in enumerate(rig):
-        block = slice(2 + _PER_CAMERA * i, 2 + _PER_CAMERA * (i + 1))
-        covariance[block, block] = np.diag(usual**2)
+    at, variance = columns_of(rig), np.zeros(n_parameters(rig))
+    variance[at["body", "scale"]], variance[at["world", "scale"]] = body_sd**2, (rig.world_sd or _WORLD_SD) ** 2
+    for camera, (kind, _) in product(rig, _KINDS_OF_CAMERA):
+        variance[at[camera.name, kind]] = np.square(_CAMERA_SD[kind])
+    variance[first_bias(rig) :] = np.tile((_PERSON_BIAS_SD if is_person else _BIAS_SD) ** 2, len(rig))
+    covariance = np.diag(variance)
+    for camera in rig:
         if camera.covariance is not None and (rig.world_sd is not None or rig.states_errors):
-            known = slice(block.start, block.start + 7)
+            known = slice(at[camera.name, "turn_deg"].start, at[camera.name, "focal"].stop)
             covariance[known, known] = camera.covariance
-    bias = np.arange(first_bias(rig), len(covariance))
-    covariance[bias, bias] = np.tile((_PERSON_BIAS_SD if is_person else _BIAS_SD) ** 2, len(rig))
-    times = np.arange(len(rig)) * _PER_CAMERA + 9
+    times = [at[camera.name, "time_s"].start for camera in rig]
     covariance[np.ix_(times, times)] -= _CAMERA_SD["time_s"] ** 2 / len(rig)  # the clock is theirs together
     if rig.world_sd is not None:
         return covariance
@@ -149,13 +145,14 @@ def prior_covariance(rig: Rig, body_sd: float, *, is_person: bool) -> Array:
 def allow_cause(prior: Array, nuisance: Nuisance) -> Array:
     """Return the prior with one cause possible that is not usual."""
     prior = prior.copy()
-    columns = np.arange(nuisance.first, nuisance.first + nuisance.size)
+    columns = np.arange(len(prior))[nuisance.columns]
     prior[columns, columns] += _GROSS_SD[nuisance.kind] ** 2
     return prior
 
 
 def _without_common_motion(covariance: Array, rig: Rig) -> Array:
-    rows = np.concatenate([np.arange(6) + 2 + _PER_CAMERA * i for i in range(len(rig))])
+    at, columns = columns_of(rig), np.arange(len(covariance))
+    rows = np.concatenate([columns[at[camera.name, kind]] for camera in rig for kind in ("turn_deg", "shift_m")])
     sd = np.sqrt(np.diag(covariance)[rows])
     common = np.concatenate([_common_motion(camera) for camera in rig])  # (6 c, 6)
     unit = np.linalg.qr(common / sd[:, None])[0]
@@ -165,13 +162,13 @@ def _without_common_motion(covariance: Array, rig: Rig) -> Array:
 
 def _about_middle(covariance: Array, rig: Rig) -> Array:
     """Return the covariance for a world that is usually larger about the cameras' middle, not about its origin."""
-    row = np.zeros(len(covariance))
-    row[1], middle = 1.0, np.mean([camera.centre for camera in rig], axis=0)
-    for i, camera in enumerate(rig):
-        first = 2 + _PER_CAMERA * i + 3
-        row[first : first + 3] = -camera.camera_from_world.rotation.apply(middle)
-    variance, others = covariance[1, 1], covariance.copy()
-    others[1, 1] = 0
+    at, row, middle = columns_of(rig), np.zeros(len(covariance)), np.mean([camera.centre for camera in rig], axis=0)
+    row[at["world", "scale"]] = 1.0
+    for camera in rig:
+        row[at[camera.name, "shift_m"]] = -camera.camera_from_world.rotation.apply(middle)
+    world, others = at["world", "scale"], covariance.copy()
+    variance = covariance[world, world]
+    others[world, world] = 0
     return others + variance * np.outer(row, row)
 
 
