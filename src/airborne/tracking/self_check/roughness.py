@@ -47,10 +47,10 @@ class PathFinding(NamedTuple):
 
 def find_wrong_path(path: TrackedPath, rough: Array) -> PathFinding | None:
     """Find a thing that moves by jerks; `rough` (2,) is its roughness, by which its deviations are multiplied."""
-    if (lost := _find_lost_pictures(path)) is not None:
+    steps = _Steps.of(path) if len(path.index) > 3 else None
+    if steps is not None and (lost := _find_lost_pictures(path, steps)) is not None:
         return lost
-    share = _share_of_repeats(path)
-    if share:
+    if steps is not None and (share := _share_of_repeats(steps)):
         return PathFinding(
             "repeated",
             share,
@@ -68,21 +68,34 @@ def find_wrong_path(path: TrackedPath, rough: Array) -> PathFinding | None:
     )
 
 
-def _find_lost_pictures(path: TrackedPath) -> PathFinding | None:
+class _Steps(NamedTuple):
+    """The steps of a path between those before and after, by position and rotation: (n, 2, 3) [m, rad]."""
+
+    step: Array
+    before: Array
+    after: Array
+    is_gapless: NDArray[np.bool_]  # (n,) the three follow one another
+    least_m: Array  # (n,) of a position's step that is seen
+
+    @classmethod
+    def of(cls, path: TrackedPath) -> _Steps:
+        """Take the steps of a path of four frames or more."""
+        turns = Rotation.from_matrix(path.rotations[1:] @ np.swapaxes(path.rotations[:-1], 1, 2)).as_rotvec()
+        moves = np.concatenate([np.diff(path.positions, axis=0), turns], axis=1).reshape(-1, 2, 3)
+        is_gapless = path.index[3:] - path.index[:-3] == 3 * np.median(np.diff(path.index))
+        variance = np.trace(path.covariance[1:-2, :3, :3], axis1=1, axis2=2)
+        return cls(moves[1:-1], moves[:-2], moves[2:], is_gapless, _LEAST_STEP_SDS * np.sqrt(variance))
+
+
+def _find_lost_pictures(path: TrackedPath, steps: _Steps) -> PathFinding | None:
     """Find the first place where a thing moves and turns in one step as in several of those beside."""
-    if len(path.index) < 4:
-        return None
-    turns = Rotation.from_matrix(path.rotations[1:] @ np.swapaxes(path.rotations[:-1], 1, 2)).as_rotvec()
-    moves = np.concatenate([np.diff(path.positions, axis=0), turns], axis=1).reshape(-1, 2, 3)
-    step, beside = moves[1:-1], (moves[:-2] + moves[2:]) / 2  # (n - 3, 2, 3)
+    beside = (steps.before + steps.after) / 2
     size = np.linalg.norm(beside, axis=2)
-    n_steps = np.rint(np.linalg.norm(step[:, 0], axis=1) / np.maximum(size[:, 0], 1e-9))
-    is_like = np.linalg.norm(step - n_steps[:, None, None] * beside, axis=2) < _LIKE_STEPS * size
-    variance = np.trace(path.covariance[1:-2, :3, :3], axis1=1, axis2=2)
-    is_seen = size[:, 0] > _LEAST_STEP_SDS * np.sqrt(variance)
-    is_gapless = path.index[3:] - path.index[:-3] == 3 * np.median(np.diff(path.index))
-    is_even = np.minimum(*np.linalg.norm([moves[:-2, 0], moves[2:, 0]], axis=2)) > 0.5 * size[:, 0]  # else one repeats
-    is_lost = is_like.all(axis=1) & is_even & is_seen & is_gapless & (n_steps > 1) & (n_steps <= _MOST_LOST)
+    n_steps = np.rint(np.linalg.norm(steps.step[:, 0], axis=1) / np.maximum(size[:, 0], 1e-9))
+    is_like = np.linalg.norm(steps.step - n_steps[:, None, None] * beside, axis=2) < _LIKE_STEPS * size
+    least = np.linalg.norm([steps.before[:, 0], steps.after[:, 0]], axis=2).min(axis=0)
+    is_sure = steps.is_gapless & (size[:, 0] > steps.least_m) & (least > 0.5 * size[:, 0])  # else one repeats
+    is_lost = is_like.all(axis=1) & is_sure & (n_steps > 1) & (n_steps <= _MOST_LOST)
     if not is_lost.any():
         return None
     k = int(np.argmax(is_lost))
@@ -96,16 +109,11 @@ def _find_lost_pictures(path: TrackedPath) -> PathFinding | None:
     )
 
 
-def _share_of_repeats(path: TrackedPath) -> float:
+def _share_of_repeats(steps: _Steps) -> float:
     """Return the share of steps that hardly are any, between two that are; 0 where they are few."""
-    if len(path.index) < 4:
-        return 0.0
-    steps = np.linalg.norm(np.diff(path.positions, axis=0), axis=1)
-    variance = np.trace(path.covariance[:, :3, :3], axis1=1, axis2=2)
-    beside = (steps[:-2] + steps[2:]) / 2
-    is_gapless = path.index[3:] - path.index[:-3] == 3 * np.median(np.diff(path.index))
-    is_seen = beside > _LEAST_STEP_SDS * np.sqrt(variance[1:-2])
-    is_repeated = is_gapless & is_seen & (steps[1:-1] < _REPEATED * beside)
+    step, before, after = np.linalg.norm([steps.step[:, 0], steps.before[:, 0], steps.after[:, 0]], axis=2)
+    beside = (before + after) / 2
+    is_repeated = steps.is_gapless & (beside > steps.least_m) & (step < _REPEATED * beside)
     n, share = np.count_nonzero(is_repeated), float(is_repeated.mean())
     return share if n >= _FEWEST_REPEATED and share >= _LEAST_SHARE else 0.0
 
