@@ -13,7 +13,8 @@ from airborne.io.text import parse_editable_toml
 from airborne.run.first_pose import find_first_pose
 from airborne.studio.folder import outer_files
 from airborne.studio.outlines import outline_items
-from airborne.studio.pages.layout import complain, in_thread, name_outer_links, page_frame, show_errors
+from airborne.studio.pages.layout import name_outer_links, page_frame
+from airborne.studio.pages.slow_work import complain, in_thread, show_errors
 from airborne.studio.project import BODY_ENDING, MEASURED_ENDINGS, list_bodies, list_measurements
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_body, reach_of

@@ -27,7 +27,8 @@ from airborne.studio.calibrating import (
 from airborne.studio.commands import Command
 from airborne.studio.digitising import list_repetitions
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import show_errors, show_findings
+from airborne.studio.pages.layout import show_findings
+from airborne.studio.pages.slow_work import show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_videos
 from airborne.studio.session import Session

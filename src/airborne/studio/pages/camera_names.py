@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from nicegui import ui
 
 from airborne.studio.calibrations import guess_name
-from airborne.studio.pages.layout import complain, show_errors
+from airborne.studio.pages.slow_work import complain, show_errors
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_cameras, with_table
 

@@ -19,15 +19,8 @@ from airborne.studio.folder import file_stamp, files_inside, outer_files
 from airborne.studio.pages.calibrate import CalibratePanel
 from airborne.studio.pages.camera_names import CameraNames, use_calibration
 from airborne.studio.pages.control_points import ControlPointsPanel
-from airborne.studio.pages.layout import (
-    in_thread,
-    name_missing_steps,
-    name_outer_links,
-    page_frame,
-    show_errors,
-    show_findings,
-    work,
-)
+from airborne.studio.pages.layout import name_missing_steps, name_outer_links, page_frame, show_findings, two_columns
+from airborne.studio.pages.slow_work import in_thread, show_errors, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.stage import draw_cameras
@@ -219,12 +212,12 @@ def _with_sd(value: float, sd: float | None, digits: int) -> str:
 
 
 def _show_rig(rig: Rig, findings: Mapping[str, Sequence[str]], deviations: Mapping[str, Mapping[str, float]]) -> None:
-    with ui.element("div").classes("split"):
-        with ui.element("div").classes("wide"):
-            draw_cameras(rig)
-        with ui.element("div").classes("side"), ui.element("div").classes("card"):
-            show_findings(findings.get("", ()))
-            for camera in rig:
-                ui.label(camera.name).classes("name")
-                ui.label(_describe(camera, deviations.get(camera.name, {}))).classes("soft small")
-                show_findings(findings.get(camera.name, ()))
+    wide, side = two_columns()
+    with wide:
+        draw_cameras(rig)
+    with side, ui.element("div").classes("card"):
+        show_findings(findings.get("", ()))
+        for camera in rig:
+            ui.label(camera.name).classes("name")
+            ui.label(_describe(camera, deviations.get(camera.name, {}))).classes("soft small")
+            show_findings(findings.get(camera.name, ()))

@@ -16,9 +16,10 @@ from airborne.errors import AirborneError, count
 from airborne.io.names import check_column
 from airborne.studio.clicks import Clicked
 from airborne.studio.outlines import legs_items, player_colours
-from airborne.studio.pages.layout import complain, in_thread, show_errors
+from airborne.studio.pages.layout import two_columns
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CHOSEN_COLOUR, PointsPanel
+from airborne.studio.pages.slow_work import complain, in_thread, show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import player_file, read_clicked_players, read_start_players
@@ -62,20 +63,20 @@ class PlayersPanel(PointsPanel):
     async def build(self) -> None:
         """Lay out the pictures and the list of points."""
         ui.label(_HELP).classes("help")
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.build_views(self.frame)
-            with ui.element("div").classes("side"):
-                with ui.element("div").classes("card"):
-                    self.choice = ui.select([], label="player", on_change=lambda event: self.take(event.value))
-                    self.choice.props("outlined dense options-dense")
-                    with ui.element("div").classes("row-line"):
-                        self.new = ui.input("another player's name").props("outlined dense").style("width: 195px")
-                        ui.button("Add", on_click=self.add).props("outline")
-                    self.note = ui.label().classes("small")
-                    self.use = ui.button("Use these players", on_click=self.write).props("unelevated")
-                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
-                self.list = PointList(self.shown.names, self.choose)
+        wide, side = two_columns()
+        with wide:
+            self.build_views(self.frame)
+        with side:
+            with ui.element("div").classes("card"):
+                self.choice = ui.select([], label="player", on_change=lambda event: self.take(event.value))
+                self.choice.props("outlined dense options-dense")
+                with ui.element("div").classes("row-line"):
+                    self.new = ui.input("another player's name").props("outlined dense").style("width: 195px")
+                    ui.button("Add", on_click=self.add).props("outline")
+                self.note = ui.label().classes("small")
+                self.use = ui.button("Use these players", on_click=self.write).props("unelevated")
+                ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
+            self.list = PointList(self.shown.names, self.choose)
         await self.reread()
 
     async def turn_to(self, frame: int) -> None:

@@ -13,11 +13,12 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.studio.clicks import Clicked
 from airborne.studio.pages.fit_pose import FitButton
-from airborne.studio.pages.layout import show_errors
+from airborne.studio.pages.layout import two_columns
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, PointsPanel
 from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
+from airborne.studio.pages.slow_work import show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import (
@@ -76,25 +77,25 @@ class ClickPanel(PointsPanel):
         """Lay out the pictures and the list of landmarks, and show the clicks that there are."""
         needed = _NEEDED_OF_PERSON if self.model.has_joints else _NEEDED_OF_THING
         ui.label(f"{_HELP} {needed} {DRAG_HELP}").classes("help")
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.build_views(self.frame, on_drag=self.drag)
-            with ui.element("div").classes("side"):
-                with ui.element("div").classes("card"):
-                    self.note = ui.label().classes("small")
-                    self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
-                    with ui.element("div").classes("row-line tools"):
-                        ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
-                        ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                        FitButton(
-                            self.session,
-                            self.hand,
-                            frame_of=lambda: self.frame,
-                            on_fit=self.take_pose,
-                            settle=self.latest.settle,
-                        )
-                        self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
-                self.list = PointList(self.shown.names, self.choose)
+        wide, side = two_columns()
+        with wide:
+            self.build_views(self.frame, on_drag=self.drag)
+        with side:
+            with ui.element("div").classes("card"):
+                self.note = ui.label().classes("small")
+                self.use = ui.button("Use this pose", on_click=self.write).props("unelevated")
+                with ui.element("div").classes("row-line tools"):
+                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
+                    ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
+                    FitButton(
+                        self.session,
+                        self.hand,
+                        frame_of=lambda: self.frame,
+                        on_fit=self.take_pose,
+                        settle=self.latest.settle,
+                    )
+                    self.stage = PoseStage(self.rig, self.hand, self.show_pose, self.take_pose)
+            self.list = PointList(self.shown.names, self.choose)
         await self.show_frame()
         stored = read_pose(self.session, self.model)
         if stored is not None and stored[0] == self.frame and (self.kept is None or has_start(self.session, self.kept)):

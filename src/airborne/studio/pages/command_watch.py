@@ -9,7 +9,7 @@ from nicegui import ui
 
 from airborne.errors import STOPPED
 from airborne.studio.commands import Command
-from airborne.studio.pages.layout import complain, in_thread
+from airborne.studio.pages.slow_work import complain, in_thread
 from airborne.studio.session import Session
 
 _LOOK_EVERY_S = 0.5  # at a command that goes on

@@ -20,7 +20,7 @@ from airborne.studio.digitising import (
     list_repetitions,
     read_digitising,
 )
-from airborne.studio.pages.layout import work
+from airborne.studio.pages.slow_work import work
 from airborne.studio.project import list_runs
 from airborne.studio.runs import run_rows
 from airborne.studio.session import Session

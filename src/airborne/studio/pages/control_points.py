@@ -14,9 +14,10 @@ from airborne.cameras.finding import Finding
 from airborne.errors import AirborneError, count
 from airborne.export.palette import SKY_BLUE
 from airborne.studio.clicks import Clicked, count_clicked, read_survey
-from airborne.studio.pages.layout import complain, show_findings
+from airborne.studio.pages.layout import show_findings, two_columns
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
+from airborne.studio.pages.slow_work import complain
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.plan import plan_svg
 from airborne.studio.project import FEWEST_POINTS
@@ -72,21 +73,21 @@ class ControlPointsPanel(PointsPanel):
 
     def build(self) -> None:
         """Lay out the pictures and the list of points."""
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.build_views(self.session.frame)
-            with ui.element("div").classes("side"):
-                self.state = ui.refreshable(self._list_state)
-                with ui.element("div").classes("card"):
-                    self.state()
-                    self.plan = ui.html(sanitize=False)
-                    self.place = ui.label().classes("soft small")
-                    with ui.element("div").classes("row-line tools"):
-                        ui.button("Remove the click", on_click=self.remove).props("flat dense")
-                        ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
-                    self.scene = ui.element("div").style("height: 260px; display: flex")
-                    self.scene.set_visibility(False)
-                self.list = PointList(self.shown.names, self.choose)
+        wide, side = two_columns()
+        with wide:
+            self.build_views(self.session.frame)
+        with side:
+            self.state = ui.refreshable(self._list_state)
+            with ui.element("div").classes("card"):
+                self.state()
+                self.plan = ui.html(sanitize=False)
+                self.place = ui.label().classes("soft small")
+                with ui.element("div").classes("row-line tools"):
+                    ui.button("Remove the click", on_click=self.remove).props("flat dense")
+                    ui.button("See them in 3D", on_click=self.draw_scene).props("flat dense")
+                self.scene = ui.element("div").style("height: 260px; display: flex")
+                self.scene.set_visibility(False)
+            self.list = PointList(self.shown.names, self.choose)
 
     def draw_scene(self) -> None:
         """Show the cameras that are solved, the points, and the rays by which each camera sees those clicked in it."""

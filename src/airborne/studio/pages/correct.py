@@ -16,10 +16,10 @@ from airborne.studio.commands import Command
 from airborne.studio.dragging import landmarks_of_grip, landmarks_px
 from airborne.studio.ghosts import ghost_of
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import in_thread, show_errors
 from airborne.studio.pages.mask_cameras import Entry, MaskPanel
 from airborne.studio.pages.pose_hand import PoseHand
 from airborne.studio.pages.run_watch import RunWatch
+from airborne.studio.pages.slow_work import in_thread, show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.runs import count_frames, count_rows, describe_progress, run_body, run_rig, run_rows
 from airborne.studio.session import Session

@@ -27,9 +27,10 @@ from airborne.studio.digitising import (
     without_point,
 )
 from airborne.studio.pages.compare_clicks import ClickComparison
-from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
+from airborne.studio.pages.layout import name_missing_steps, page_frame, two_columns
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, PREDICTED_COLOUR, PointsPanel
+from airborne.studio.pages.slow_work import complain, in_thread, show_errors, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.view import Item, Mark
@@ -95,16 +96,16 @@ class DigitisePanel(PointsPanel):
 
     def build(self) -> None:
         """Lay out the pictures, who digitises, the points, and what can be compared."""
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.build_views(self.frame)
-            with ui.element("div").classes("side"):
-                with ui.element("div").classes("card"):
-                    self._build_who()
-                self.list = PointList(self.shown.names, self.choose, empty=_EMPTY)
-                with ui.element("div").classes("card"):
-                    self._build_points()
-                    ClickComparison(self.session, self.model, self.shown.names, lambda: (self.who, self.table))
+        wide, side = two_columns()
+        with wide:
+            self.build_views(self.frame)
+        with side:
+            with ui.element("div").classes("card"):
+                self._build_who()
+            self.list = PointList(self.shown.names, self.choose, empty=_EMPTY)
+            with ui.element("div").classes("card"):
+                self._build_points()
+                ClickComparison(self.session, self.model, self.shown.names, lambda: (self.who, self.table))
         self.show()
 
     def _build_who(self) -> None:

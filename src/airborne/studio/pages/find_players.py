@@ -11,7 +11,8 @@ from airborne.cameras import Rig
 from airborne.errors import count
 from airborne.studio.outlines import legs_items, player_colours
 from airborne.studio.pages.find_controls import FindControls
-from airborne.studio.pages.layout import show_errors
+from airborne.studio.pages.layout import two_columns
+from airborne.studio.pages.slow_work import show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import keep_start, read_draft_start
@@ -41,12 +42,12 @@ class FindPlayersPanel:
         """Lay out the pictures and what can be done."""
         ui.label(_HELP).classes("help")
         self.controls = FindControls(self.session, "players", _USE, self.show_found)
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to)
-            with ui.element("div").classes("side"), ui.element("div").classes("card"):
-                self.controls.build()
-                self.use = ui.button(_USE, on_click=self.write).props("unelevated")
+        wide, side = two_columns()
+        with wide:
+            self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to)
+        with side, ui.element("div").classes("card"):
+            self.controls.build()
+            self.use = ui.button(_USE, on_click=self.write).props("unelevated")
         self.use.set_visibility(False)
         if (start := self._read_draft()) is not None:
             self.show_players(start)

@@ -11,9 +11,10 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Rig
 from airborne.studio.pages.find_controls import FindControls
 from airborne.studio.pages.fit_pose import FitButton
-from airborne.studio.pages.layout import show_errors
+from airborne.studio.pages.layout import two_columns
 from airborne.studio.pages.pose_hand import DRAG_HELP, KEPT, SET_BY_HAND, STORED, PoseHand
 from airborne.studio.pages.pose_stage import PoseStage
+from airborne.studio.pages.slow_work import show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.starts import (
@@ -50,16 +51,16 @@ class FindPanel:
         ui.label(f"{_HELP} {DRAG_HELP}").classes("help")
         self.hand = PoseHand(self.model, self.rig.select(self.shown.names).cameras, lambda pose: None)
         self.controls = FindControls(self.session, "body", _USE, self.show_found)
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to, on_drag=self.drag)
-            with ui.element("div").classes("side"), ui.element("div").classes("card"):
-                self.controls.build()
-                self.use = ui.button(_USE, on_click=self.write).props("unelevated")
-                with ui.element("div").classes("row-line tools"):
-                    ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
-                    FitButton(self.session, self.hand, frame_of=lambda: self.at, on_fit=self.take_pose)
-                    self.stage = PoseStage(self.rig, self.hand, lambda: self.turn_to(self.frame), self.take_pose)
+        wide, side = two_columns()
+        with wide:
+            self.view = CameraViews(self.shown, frame=self.frame, on_frame=self.turn_to, on_drag=self.drag)
+        with side, ui.element("div").classes("card"):
+            self.controls.build()
+            self.use = ui.button(_USE, on_click=self.write).props("unelevated")
+            with ui.element("div").classes("row-line tools"):
+                ui.button("Place it by hand", on_click=self.begin_by_hand).props("flat dense")
+                FitButton(self.session, self.hand, frame_of=lambda: self.at, on_fit=self.take_pose)
+                self.stage = PoseStage(self.rig, self.hand, lambda: self.turn_to(self.frame), self.take_pose)
         await self.show_kept()
 
     async def show_kept(self) -> None:

@@ -12,7 +12,8 @@ from airborne.studio.pages.click_players import PlayersPanel
 from airborne.studio.pages.click_pose import ClickPanel
 from airborne.studio.pages.find_players import FindPlayersPanel
 from airborne.studio.pages.find_pose import FindPanel
-from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, work
+from airborne.studio.pages.layout import name_missing_steps, page_frame
+from airborne.studio.pages.slow_work import complain, in_thread, work
 from airborne.studio.session import Session
 from airborne.studio.starts import can_be_clicked, read_draft_start
 

@@ -8,8 +8,8 @@ from nicegui import ui
 
 from airborne.studio.fitting import FirstPoseFit, describe_quality, fit_to_frame
 from airborne.studio.outlines import BESIDE_COLOUR, outline_items
-from airborne.studio.pages.layout import complain, show_errors, work
 from airborne.studio.pages.pose_hand import PoseHand
+from airborne.studio.pages.slow_work import complain, show_errors, work
 from airborne.studio.session import Session
 from airborne.studio.starts import keep_start, read_draft_start, start_from_pose
 

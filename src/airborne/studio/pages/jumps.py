@@ -10,7 +10,7 @@ from pathlib import Path
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
-from airborne.studio.pages.layout import complain, in_thread, show_errors
+from airborne.studio.pages.slow_work import complain, in_thread, show_errors
 from airborne.studio.strips import doubtful_frames
 from airborne.studio.view import CameraViews
 

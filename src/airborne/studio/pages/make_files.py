@@ -12,7 +12,7 @@ from airborne.run.export import EXPORT_FORMATS
 from airborne.run.film import check_order
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import show_errors
+from airborne.studio.pages.slow_work import show_errors
 from airborne.studio.runs import note_if_older
 from airborne.studio.session import Session
 

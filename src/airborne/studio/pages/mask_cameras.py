@@ -11,7 +11,7 @@ from nicegui import ui
 
 from airborne.errors import TrialError
 from airborne.export.methods_text import name_stretch
-from airborne.studio.pages.layout import complain, show_errors
+from airborne.studio.pages.slow_work import complain, show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.tracked_again import name_frames

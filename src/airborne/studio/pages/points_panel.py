@@ -13,7 +13,7 @@ from airborne.cameras import Rig
 from airborne.cameras.epipolar import epipolar_curve
 from airborne.export.palette import BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION, YELLOW
 from airborne.studio.clicks import Clicked
-from airborne.studio.pages.layout import Latest, complain, show_errors
+from airborne.studio.pages.slow_work import Latest, complain, show_errors
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.view import CameraViews, Drag, Item

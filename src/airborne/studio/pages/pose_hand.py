@@ -12,7 +12,7 @@ from airborne.body import BodyModel, Pose
 from airborne.cameras import Camera
 from airborne.studio.dragging import Grip, Pin, drag_pose, grip_at, grip_landmark, turn_with
 from airborne.studio.outlines import outline_items
-from airborne.studio.pages.layout import in_thread
+from airborne.studio.pages.slow_work import in_thread
 from airborne.studio.starts import POSE_COLOUR
 from airborne.studio.view import CameraViews, Drag, Mark
 

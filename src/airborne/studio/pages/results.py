@@ -13,8 +13,9 @@ from airborne.export.methods_text import describe_corrections, describe_methods
 from airborne.motion.run_folder import REPORT, note_if_unfinished, read_summary
 from airborne.run.folder import list_tables
 from airborne.run.self_check import alarms
-from airborne.studio.pages.layout import in_thread, name_outer_links, page_frame
+from airborne.studio.pages.layout import name_outer_links, page_frame
 from airborne.studio.pages.make_files import Making
+from airborne.studio.pages.slow_work import in_thread
 from airborne.studio.project import list_outer_runs, list_runs
 from airborne.studio.runs import note_if_older
 from airborne.studio.session import Session

@@ -20,9 +20,10 @@ from airborne.studio.disagreement import look_for_disagreement
 from airborne.studio.outlines import BESIDE_COLOUR, leg_rods, player_colours, sides_m
 from airborne.studio.pages.correct import Correction
 from airborne.studio.pages.jumps import Jumps
-from airborne.studio.pages.layout import in_thread, page_frame, show_errors, work
+from airborne.studio.pages.layout import page_frame, two_columns
 from airborne.studio.pages.mask_cameras import PlayersMasks
 from airborne.studio.pages.run_watch import RunWatch
+from airborne.studio.pages.slow_work import in_thread, show_errors, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import list_runs
 from airborne.studio.runs import run_body, run_players, run_rig, run_rows
@@ -143,23 +144,23 @@ async def _show_run(
             ui.label(
                 await in_thread(describe_distance, folder, session.folder / beside, says="comparing the runs")
             ).classes("soft")
-    with ui.element("div").classes("split"):
-        with ui.element("div").classes("wide"):
-            view = CameraViews(
-                shown,
-                frame=frame,
-                overlay=f"/overlay/{quote(folder.name)}/{{frame}}{query}",
-                on_frame=turn_to,
-                on_move=correction.move if isinstance(correction, Correction) else None,
-                on_drag=correction.drag if isinstance(correction, Correction) else None,
-            )
-            correction.view = view
-        with ui.element("div").classes("side"):
-            correction.build_watch()
-            if isinstance(correction, PlayersMasks):
-                bodies.append(await _players_stage(folder, view.frame))
-            else:
-                bodies += await _stage(files, view)
+    wide, side = two_columns()
+    with wide:
+        view = CameraViews(
+            shown,
+            frame=frame,
+            overlay=f"/overlay/{quote(folder.name)}/{{frame}}{query}",
+            on_frame=turn_to,
+            on_move=correction.move if isinstance(correction, Correction) else None,
+            on_drag=correction.drag if isinstance(correction, Correction) else None,
+        )
+        correction.view = view
+    with side:
+        correction.build_watch()
+        if isinstance(correction, PlayersMasks):
+            bodies.append(await _players_stage(folder, view.frame))
+        else:
+            bodies += await _stage(files, view)
     curves = Curves(address, frame=frame)
 
     def draw_anew() -> None:

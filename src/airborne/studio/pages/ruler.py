@@ -11,9 +11,10 @@ from nicegui import ui
 
 from airborne.cameras import Rig
 from airborne.studio.clicks import Clicked, measure_between, read_clicked
-from airborne.studio.pages.layout import name_missing_steps, page_frame, show_errors, work
+from airborne.studio.pages.layout import name_missing_steps, page_frame, two_columns
 from airborne.studio.pages.point_list import PointList
 from airborne.studio.pages.points_panel import CAMERA_COLOURS, CHOSEN_COLOUR, CLICK_SD_PX, PointsPanel
+from airborne.studio.pages.slow_work import show_errors, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.view import Mark
@@ -60,14 +61,14 @@ class RulerPanel(PointsPanel):
 
     async def build(self) -> None:
         """Lay out the pictures, the ends and their distance."""
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.build_views(self.session.frame)
-            with ui.element("div").classes("side"):
-                with ui.element("div").classes("card"):
-                    self.says = ui.label().classes("name")
-                    ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
-                self.list = PointList(self.shown.names, self.choose)
+        wide, side = two_columns()
+        with wide:
+            self.build_views(self.session.frame)
+        with side:
+            with ui.element("div").classes("card"):
+                self.says = ui.label().classes("name")
+                ui.button("Remove the chosen click", on_click=self.remove).props("flat dense")
+            self.list = PointList(self.shown.names, self.choose)
         await self.reread()
 
     async def reread(self) -> None:

@@ -11,7 +11,7 @@ from nicegui import ui
 
 from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY
 from airborne.studio.folder import file_stamp
-from airborne.studio.pages.layout import show_errors
+from airborne.studio.pages.slow_work import show_errors
 
 _LOOK_EVERY_S = 1.0  # at the files' stamps
 _FILES = (MOTION, JOINTS, SUMMARY)  # of which at least one changes whenever a run does

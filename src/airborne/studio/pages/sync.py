@@ -11,8 +11,9 @@ from nicegui.events import KeyEventArguments
 from airborne.errors import count
 from airborne.studio.commands import Command
 from airborne.studio.pages.command_watch import CommandWatch
-from airborne.studio.pages.layout import page_frame, show_errors, work
+from airborne.studio.pages.layout import page_frame, two_columns
 from airborne.studio.pages.points_panel import CAMERA_COLOURS
+from airborne.studio.pages.slow_work import show_errors, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.sync_evidence import WAYS, curves_svg, level_curves
@@ -62,11 +63,10 @@ class _Panel:
             ui.button("Show the same moment", on_click=self.show_moment).props("flat dense").tooltip(_MOMENT)
             self.use = ui.button("Use this offset", on_click=self.write).props("unelevated")
             self.says = ui.label().classes("small")
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.labels = [ui.label().classes("small name")]
-                CameraViews(self.shown, frame=0, camera=0, on_frame=lambda number: self.turn(0, number))
-            self.right = ui.element("div").classes("wide")
+        left, self.right = two_columns("wide")
+        with left:
+            self.labels = [ui.label().classes("small name")]
+            CameraViews(self.shown, frame=0, camera=0, on_frame=lambda number: self.turn(0, number))
         with ui.element("div").classes("row-line"):
             ui.label("Or find it automatically:").classes("soft")
             way = ui.select(_WAYS, label="from", value="motion").props("outlined dense options-dense")

@@ -10,7 +10,8 @@ from nicegui import ui
 from airborne.errors import AirborneError
 from airborne.studio.folder import files_inside
 from airborne.studio.pages.body import save_body
-from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
+from airborne.studio.pages.layout import name_missing_steps, page_frame, two_columns
+from airborne.studio.pages.slow_work import complain, in_thread, show_errors, work
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.session import Session
 from airborne.studio.things import LABELS, MESHES, Solid, check_thing, colour_at, parse_thing, thing_text
@@ -53,18 +54,18 @@ class ThingPanel:
 
     def build(self) -> None:
         """Lay out the pictures and the solids."""
-        with ui.element("div").classes("split"):
-            with ui.element("div").classes("wide"):
-                self.view = CameraViews(
-                    self.shown, frame=self.session.frame, on_frame=self.session.turn_to, on_pick=self.take_colour
-                )
-                self.view.start_picking()
-            with ui.element("div").classes("side"), ui.element("div").classes("card"):
-                name = ui.input("what it is", on_change=lambda: self.keep("thing named")).bind_value(self, "name")
-                name.props(f"outlined dense {_SOON}")
-                self.form = ui.refreshable(self._form)
-                self.form()
-                ui.button("Use this thing", on_click=self.write).props("unelevated")
+        wide, side = two_columns()
+        with wide:
+            self.view = CameraViews(
+                self.shown, frame=self.session.frame, on_frame=self.session.turn_to, on_pick=self.take_colour
+            )
+            self.view.start_picking()
+        with side, ui.element("div").classes("card"):
+            name = ui.input("what it is", on_change=lambda: self.keep("thing named")).bind_value(self, "name")
+            name.props(f"outlined dense {_SOON}")
+            self.form = ui.refreshable(self._form)
+            self.form()
+            ui.button("Use this thing", on_click=self.write).props("unelevated")
 
     async def take_colour(self, pane: int, u: float, v: float, near: str | None) -> None:
         """Give the chosen solid the colour that a picture has there."""

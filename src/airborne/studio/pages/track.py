@@ -12,7 +12,8 @@ from nicegui import ui
 from airborne.errors import STOPPED, UNTRACKED, AirborneError, ResultError, TrialError, count
 from airborne.motion.run_folder import JOINTS, MOTION, SUMMARY, read_summary
 from airborne.studio.commands import Command
-from airborne.studio.pages.layout import complain, in_thread, name_missing_steps, page_frame, show_errors, work
+from airborne.studio.pages.layout import name_missing_steps, page_frame
+from airborne.studio.pages.slow_work import complain, in_thread, show_errors, work
 from airborne.studio.pages.track_settings import TrackSettingsBar
 from airborne.studio.pictures import ShownTrial
 from airborne.studio.project import find_run, list_runs

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from airborne.errors import TrialError
-from airborne.studio.pages.layout import show_errors
+from airborne.studio.pages.slow_work import show_errors
 from airborne.studio.runs import count_frames
 from airborne.studio.session import Session
 from airborne.trial.settings import BODY_METHODS, PLAYERS_METHODS

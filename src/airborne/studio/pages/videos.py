@@ -12,7 +12,8 @@ from airborne.errors import AirborneError, count
 from airborne.io.names import check_name
 from airborne.studio.field_order import ORDERS
 from airborne.studio.folder import outer_files
-from airborne.studio.pages.layout import complain, in_thread, name_outer_links, page_frame, show_errors
+from airborne.studio.pages.layout import name_outer_links, page_frame
+from airborne.studio.pages.slow_work import complain, in_thread, show_errors
 from airborne.studio.project import VIDEO_ENDINGS, Project, list_videos
 from airborne.studio.session import Session
 from airborne.studio.trial_edits import with_cameras
