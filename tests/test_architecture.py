@@ -84,6 +84,7 @@ KERNELS = [
 ]
 MOST_LINES_A_FILE, MOST_LINES_A_FUNCTION = 300, 90
 HEAVY = ("matplotlib", "nicegui", "tkinter", "PyQt5", "PySide6", "typer", "ezc3d", "yeadon")
+IMPORT_LATE = "import it inside the function that needs it: python -X importtime tells who loads it now"
 FILES = sorted(SOURCE.rglob("*.py"))
 TEXTS = {path: path.read_text(encoding="utf-8") for path in FILES}
 
@@ -109,7 +110,7 @@ def imports_of(source):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             names = [f"{node.module}.{alias.name}" for alias in node.names]
-            assert node.level == 0, "imports are absolute"
+            assert node.level == 0, f"write airborne.… for the dots: {ast.unparse(node)}"
         else:
             continue
         found += [tuple(name.split(".")[1:]) for name in names if name.split(".")[0] == "airborne"]
@@ -174,8 +175,11 @@ def test_arrows_are_told_apart():
 
 
 def test_every_module_has_its_place_in_the_order():
-    assert {layer_of(path) for path in FILES} - FOR_ALL <= set(ORDER)
-    assert {layer_of(path) for path in FILES} >= set(PACKAGES)
+    layers = {layer_of(path) for path in FILES} - FOR_ALL
+    assert layers <= set(ORDER), (
+        "enter the room in ORDER here and in docs/explanation/architecture.md, or move the file"
+    )
+    assert layers >= set(PACKAGES), "take the room that is gone out of ORDER and of docs/explanation/architecture.md"
 
 
 def offenders(law):
@@ -192,28 +196,33 @@ def test_imports_only_go_down_the_page():
             return layers_of(text)  # errors, types and constants import nothing of the package
         return upward_arrows(layer_of(path), text)
 
-    assert offenders(climbs) == {}
+    mend = "move what is imported down into a room that both may import, or pass its result on as an argument"
+    assert offenders(climbs) == {}, mend
 
 
 def test_no_room_imports_the_public_interface():
     public = {*airborne.__all__, "interface"}
     found = offenders(lambda path, text: {imported[0] for imported in imports_of(text) if imported} & public)
-    assert set(found) <= {"__init__.py", "interface/__init__.py"}  # which has modules of its own
+    may = {"__init__.py", "interface/__init__.py"}  # which has modules of its own
+    assert set(found) <= may, "import it from the room that defines it"
 
 
 def test_only_its_command_imports_the_studio():
     found = offenders(lambda path, text: layer_of(path) != "studio" and "studio" in layers_of(text))
-    assert set(found) <= {"cli/studio.py"}
+    assert set(found) <= {"cli/studio.py"}, "move what others need out of the studio, into the room whose subject it is"
 
 
 @pytest.mark.parametrize("name", KERNELS)
 def test_array_kernels_know_no_nouns(name):
-    assert layers_of((SOURCE / name).read_text()) & set(NOUNS) == set()
+    nouns = layers_of((SOURCE / name).read_text()) & set(NOUNS)
+    assert nouns == set(), "take arrays as arguments, or take the file out of KERNELS if it is none"
 
 
 def test_files_and_functions_are_short():
-    assert {name_of(path) for path, text in TEXTS.items() if len(text.splitlines()) > MOST_LINES_A_FILE} == set()
-    assert offenders(lambda _, text: [name for name, n in functions_of(text) if n > MOST_LINES_A_FUNCTION]) == {}
+    long_files = {name_of(path): n for path, text in TEXTS.items() if (n := len(text.splitlines())) > MOST_LINES_A_FILE}
+    assert long_files == {}, f"split by subject: {MOST_LINES_A_FILE} lines at most"
+    long_ones = offenders(lambda _, text: [name for name, n in functions_of(text) if n > MOST_LINES_A_FUNCTION])
+    assert long_ones == {}, f"name a part of it and take it out: {MOST_LINES_A_FUNCTION} lines at most, docstring aside"
 
 
 def test_numbers_without_a_word_are_found():
@@ -227,7 +236,7 @@ def test_numbers_without_a_word_are_found():
 
 def test_every_number_of_a_module_says_what_it_is():
     found = offenders(lambda _, text: numbers_without_a_word(text))
-    assert found == {}, "say beside it what it is, its unit, and its source"
+    assert found == {}, "say in a comment beside it what it is, its unit, and its source, be it only 'chosen'"
 
 
 def test_length_of_a_function_leaves_its_docstring_out():
@@ -238,12 +247,11 @@ def test_length_of_a_function_leaves_its_docstring_out():
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_package_says_what_it_is_and_what_is_public(package):
     tree = ast.parse((SOURCE / package / "__init__.py").read_text())
-    assert len((ast.get_docstring(tree) or "").split()) >= 5, "a docstring that says what comes in and what goes out"
+    assert len((ast.get_docstring(tree) or "").split()) >= 5, "write what comes in and what goes out, as its docstring"
     lists = [node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "__all__"]
-    assert len(lists) == 1, "__all__ lists the public names"
+    assert len(lists) == 1, "list its public names in __all__, once"
     names = ast.literal_eval(lists[0])
-    assert names
-    assert len(set(names)) == len(names)
+    assert names and len(set(names)) == len(names), "list each public name of the package once in __all__"
 
 
 def test_the_command_line_opens_without_numbers_and_figures():
@@ -251,21 +259,21 @@ def test_the_command_line_opens_without_numbers_and_figures():
     code = f"import sys, airborne.cli; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.stderr == ""
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.strip() == "[]", IMPORT_LATE
 
 
 def test_tracking_loads_no_figures_and_no_windows():
     code = f"import sys, airborne.tracking, airborne.tracking.methods; print([m for m in {HEAVY} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.stderr == ""
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.strip() == "[]", IMPORT_LATE
 
 
 def test_a_run_without_pictures_loads_no_library_of_figures_or_labelled_tables():
     heavy = ("matplotlib", "xarray", "pandas", "trimesh", "jinja2", "nicegui", "dask", "pyarrow")
     code = f"import sys, airborne.run.track, airborne.trial.file; print(*({{*sys.modules}} & {{*{heavy}}}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []
+    assert done.stdout.split() == [], IMPORT_LATE
 
 
 def test_the_page_of_the_architecture_names_places_that_are_there():
@@ -273,7 +281,7 @@ def test_the_page_of_the_architecture_names_places_that_are_there():
     text = (SOURCE.parents[1] / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
     rows = [line for line in text.partition("## Where to put")[2].splitlines() if line.startswith("| ")][2:]
     code = "\n".join(path.read_text(encoding="utf-8") for path in SOURCE.rglob("*.py"))
-    assert len(rows) > 30
+    assert len(rows) > 30, "put the table back below the heading Where to put something new, or look for it elsewhere"
     for row in rows:
         folders = [SOURCE, SOURCE.parents[1]]
         for name in re.findall(r"`([^`]+)`", row):
@@ -282,8 +290,10 @@ def test_the_page_of_the_architecture_names_places_that_are_there():
                 found = next((place for place in places if place.exists()), None)
                 is_of_run = name.endswith(".csv") or name == "trial.toml"  # not a file of the code
                 assert found or is_of_run, (
-                    f"docs/explanation/architecture.md sends to {name}, which is not there: {row}"
+                    f"name its new place in docs/explanation/architecture.md, {name} is not there: {row}"
                 )
                 folders += [] if found is None else [found.parent, found]
             else:
-                assert re.search(rf"\b{re.escape(name.strip('[]'))}\b", code), f"no code has {name}: {row}"
+                assert re.search(rf"\b{re.escape(name.strip('[]'))}\b", code), (
+                    f"name in docs/explanation/architecture.md what {name} has become: {row}"
+                )

@@ -35,12 +35,15 @@ def test_many_arguments_are_counted_where_they_have_no_names():
 
 def test_a_public_name_is_defined_once():
     counts = Counter(name for path in TEXTS for name in public_names(path))
-    assert [name for name, n in counts.items() if n > 1] == []
+    twice = [name for name, n in counts.items() if n > 1]
+    assert twice == [], "rename one of each two, or let both places import it: a public name means one thing"
 
 
 def test_no_function_has_the_name_of_its_module():
-    assert [str(path) for path in TEXTS if path.stem in public_names(path)] == []
+    same = [str(path) for path in TEXTS if path.stem in public_names(path)]
+    assert same == [], "rename module or function: importing one would hide the other"
 
 
 def test_few_functions_take_more_than_four_arguments_by_position():
-    assert len([name for text in TEXTS.values() for name in take_many(text)]) <= MOST_THAT_TAKE_MORE
+    many = [name for text in TEXTS.values() for name in take_many(text)]
+    assert len(many) <= MOST_THAT_TAKE_MORE, f"put * before the new one's arguments from the third or so on: {many}"
