@@ -98,7 +98,8 @@ def pytest_sessionfinish(session, exitstatus):
 
 def pytest_terminal_summary(terminalreporter, config):
     """Remember what was skipped."""
-    config.cache.set(SKIPPED, [report.nodeid for report in terminalreporter.stats.get("skipped", [])])
+    if config.pluginmanager.hasplugin("cacheprovider"):
+        config.cache.set(SKIPPED, [report.nodeid for report in terminalreporter.stats.get("skipped", [])])
 
 
 @pytest.fixture(scope="session", autouse=True)
