@@ -25,7 +25,7 @@ from airborne.body.skin import skin_of
 from airborne.cameras import Rig, camera_looking_at
 from airborne.geometry.rotations import angles_from_matrix
 from airborne.synthetic.flight.articulated import Takeoff, joint_motion
-from airborne.synthetic.flight.somersault import Skill
+from airborne.synthetic.flight.skill import Skill
 from airborne.synthetic.throw.pictures import scene_frames
 from airborne.synthetic.throw.scene import HALL_AMBIENT, PICTURE_SIZE, Scene, hall_spots
 from airborne.synthetic.throw.surroundings import gym

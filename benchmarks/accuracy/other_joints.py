@@ -41,7 +41,7 @@ from airborne.motion.run_folder import read_body_run
 from airborne.run.track import track_trial
 from airborne.synthetic import Scene, Takeoff, gym, write_trial
 from airborne.synthetic.flight.articulated import joint_motion, mass_at_angles
-from airborne.synthetic.flight.somersault import Skill
+from airborne.synthetic.flight.skill import Skill
 from airborne.synthetic.throw.scene import HALL_AMBIENT, hall_spots
 from airborne.trial.body import BodyTable
 from airborne.trial.file import Trial, read_trial

@@ -12,7 +12,8 @@ from airborne.cameras import Rig, camera_looking_at
 from airborne.errors import ResultError
 from airborne.run.film import _open, write_film
 from airborne.video import VideoSource, VideoWriter, inspect
-from airborne.video.seeking import ImageReader, index_images
+from airborne.video.image_index import index_images
+from airborne.video.seeking import ImageReader
 from tests.run.test_find import cli
 from tests.support.person_run import write_person_run
 

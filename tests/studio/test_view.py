@@ -8,7 +8,7 @@ import pytest
 from airborne.io.text import read_toml
 from airborne.studio.clicks import read_clicked
 from airborne.video import VideoSource, VideoWriter, weave
-from airborne.video.seeking import index_images
+from airborne.video.image_index import index_images
 from tests.support.browser import open_page
 from tests.support.clips import write_clip
 from tests.support.studio import at_pixel, burn_numbers, fork_studio, go_home, read_number, wait_for_frame, wait_until

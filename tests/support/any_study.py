@@ -31,7 +31,8 @@ from airborne.studio.writing import FOLDER
 from airborne.sync.audio import read_sound
 from airborne.trial.file import read_trial
 from airborne.video.decoding import VideoSource
-from airborne.video.seeking import ImageReader, index_images
+from airborne.video.image_index import index_images
+from airborne.video.seeking import ImageReader
 from tests.support import players_trial as players
 from tests.support.motions import run_with_gap
 from tests.support.places import THROWN_CROSS

@@ -10,7 +10,8 @@ from airborne.errors import VideoError
 from airborne.video import VideoSource, inspect, open_recording, seeking
 from airborne.video.decoding import decode, rgb_from_decoded
 from airborne.video.fields import fill_rows
-from airborne.video.seeking import ImageReader, index_images, match_images
+from airborne.video.image_index import index_images, match_images
+from airborne.video.seeking import ImageReader
 from tests.support.clips import numbered, packets_of, plain_rig, textured, with_noise, write_clip
 from tests.support.places import ROOT
 

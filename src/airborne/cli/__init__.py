@@ -21,6 +21,8 @@ from airborne.cli.convert import convert_command
 from airborne.cli.export import export_command
 from airborne.cli.film import film_command
 from airborne.cli.find import find_command, frame_command
+from airborne.cli.fit_body import fit_body_command
+from airborne.cli.machine import bench_command, warm_command
 from airborne.cli.smooth import smooth_command
 from airborne.cli.studio import studio_command
 from airborne.cli.sync import sync_command
@@ -36,7 +38,7 @@ _STEPS = {  # in the order of the work
         "check": check_command,
         "find": find_command,
         "frame": frame_command,
-        "fit-body": track.fit_body_command,
+        "fit-body": fit_body_command,
     },
     "Track": {"track": track.track_command, "new": new_command, "batch": batch_command},
     "Results": {
@@ -46,7 +48,7 @@ _STEPS = {  # in the order of the work
         "export": export_command,
         "film": film_command,
     },
-    "This machine": {"bench": track.bench_command, "warm": track.warm_command},
+    "This machine": {"bench": bench_command, "warm": warm_command},
 }
 _SYNTH = {
     "cross": synth.synth_cross_command,

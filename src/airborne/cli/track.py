@@ -1,8 +1,7 @@
-"""Commands that track: the demo, a trial, a body fitted to a person, the machine's speed."""
+"""Commands that track: the demo, a trial."""
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from functools import partial
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from airborne.cli.console import Json, Out, progress, stop
+from airborne.cli.console import Json, Out, stop
 from airborne.cli.results import evaluate_command
 from airborne.errors import UNTRACKED, AirborneError, count, count_of, format_digits
 from airborne.io.terminal import Stages
@@ -248,52 +247,3 @@ def _describe(summary: dict, output: Path) -> str:
 
 def _describe_sd(sd: float, unit: str) -> str:
     return f"{format_digits(sd, 2)} {unit}" if math.isfinite(sd) else "not visible in the images"
-
-
-def fit_body_command(
-    trial: Annotated[Path, typer.Argument(help="The trial's TOML file, with detections, joints_m or points_px.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The body file to write.")],
-    frames: Annotated[int, typer.Option(min=1, help="How many frames to fit the body to.")] = 5,
-    skeleton: Annotated[
-        str | None, typer.Option(help="Whose points the detections are, if their files do not say: BODY_25, ...")
-    ] = None,
-) -> None:
-    """Fit the trial's body to the person in its videos: lengths, girths, colours and where they change.
-
-    Example: airborne fit-body trial.toml -o person.toml
-    """
-    from airborne.run.own_body import describe_fit, fit_person
-    from airborne.trial.file import read_trial
-
-    with progress("reading and fitting") as report:
-        fitted = fit_person(
-            read_trial(trial),
-            output,
-            n_frames=frames,
-            skeleton=skeleton,
-            progress=lambda what, done, total: report(done, total),
-        )
-    print(f"{describe_fit(fitted)}\nbody: {output}\npicture: {fitted.picture}")
-
-
-def bench_command(as_json: Json = False) -> None:
-    """Measure the speed of this machine on the bundled example: CPU time per field, and per hypothesis.
-
-    Example: airborne bench
-    """
-    from airborne.run.bench import measure_speed
-
-    speeds = measure_speed()
-    print(json.dumps(speeds) if as_json else "\n".join(f"{name}: {value:.3g}" for name, value in speeds.items()))
-
-
-def warm_command() -> None:
-    """Compile now what the first runs would compile, for machines that are prepared; a minute or more, once.
-
-    Example: airborne warm
-    """
-    from airborne.run.warm import warm_kernels
-
-    begun_s = time.monotonic()
-    warm_kernels()
-    print(f"kernels are ready after {time.monotonic() - begun_s:.0f} s")

@@ -19,7 +19,8 @@ from airborne.export.palette import TEXT_RGB
 from airborne.motion.run_folder import SUMMARY, VIDEOS, holds_players, read_body_run, read_players_run
 from airborne.types import Array, Image, Progress
 from airborne.video import VideoSource, VideoWriter
-from airborne.video.seeking import ImageReader, index_images
+from airborne.video.image_index import index_images
+from airborne.video.seeking import ImageReader
 
 _WIDEST_PX = {".mp4": 1920, ".gif": 960}  # of the film: what screens, and pages, take
 _MOST_GIF_HZ = 25  # browsers slow faster ones down

@@ -14,7 +14,7 @@ from airborne.errors import ResultError
 from airborne.io.npz import read_arrays, write_arrays
 from airborne.studio.folder import file_stamp
 from airborne.video import VideoSource, inspect
-from airborne.video.seeking import ImageIndex, index_images
+from airborne.video.image_index import ImageIndex, index_images
 
 LISTS = "images"  # in the folder of what the studio remembers
 

@@ -20,7 +20,8 @@ from airborne.studio.prefetch import Prefetch
 from airborne.trial.cameras import CameraTable
 from airborne.types import Image
 from airborne.video import VideoFacts, VideoSource
-from airborne.video.seeking import ImageIndex, ImageReader, TrialClock, match_images
+from airborne.video.image_index import ImageIndex, TrialClock, match_images
+from airborne.video.seeking import ImageReader
 
 _MOST_BYTES = 300_000_000  # of JPEG on the disk: three cameras of 1080p for a minute, at a quarter of their size
 _MOST_OPEN = 32  # files

@@ -15,7 +15,8 @@ from airborne.errors import AirborneError
 from airborne.studio.jpeg_store import JpegStore, Key
 from airborne.types import Image
 from airborne.video import VideoSource
-from airborne.video.seeking import ImageIndex, ImageReader
+from airborne.video.image_index import ImageIndex
+from airborne.video.seeking import ImageReader
 
 _QUIET_S = 0.15  # without a question: a browser that shows frames one after another asks again sooner
 _LOOK_AGAIN_S = 0.03  # between looks whether somebody waits

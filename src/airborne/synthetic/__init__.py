@@ -6,7 +6,8 @@ from airborne.synthetic.block.truth import jump_truth, noisy_starts, torso_input
 from airborne.synthetic.block.writing import write_block
 from airborne.synthetic.flight.articulated import Takeoff, fly_articulated
 from airborne.synthetic.flight.rigid import Launch, MassProperties, SampledFlight, fly, mass_properties
-from airborne.synthetic.flight.somersault import PoseRanges, half_twist, somersault_scene
+from airborne.synthetic.flight.skill import PoseRanges, half_twist
+from airborne.synthetic.flight.somersault import somersault_scene
 from airborne.synthetic.throw.light import Ambient, Spot
 from airborne.synthetic.throw.pictures import scene_frames
 from airborne.synthetic.throw.scene import Scene, cross_scene

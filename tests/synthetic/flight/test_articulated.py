@@ -266,7 +266,7 @@ def test_body_with_a_segment_without_inertia_is_refused_by_name():
 
 def test_mujoco_flies_a_somersault_to_the_same_landing():
     mujoco = pytest.importorskip("mujoco")
-    from airborne.synthetic.flight.somersault import half_twist
+    from airborne.synthetic.flight.skill import half_twist
 
     skill = half_twist(human18(1.66, 58.0), has_pike=True)
     flight = skill(np.array([0.0, skill.duration_s]))

@@ -19,7 +19,8 @@ from airborne.evaluation.truth import read_truth
 from airborne.geometry.rotations import angles_from_matrix, geodesic, matrix_from_angles, unwrap
 from airborne.motion.flight.momentum import centre_of_mass
 from airborne.synthetic import half_twist, scene_frames, somersault_scene, write_trial
-from airborne.synthetic.flight.somersault import MASS_KG, PAPER_RANGES, STATURE_M
+from airborne.synthetic.flight.skill import PAPER_RANGES
+from airborne.synthetic.flight.somersault import MASS_KG, STATURE_M
 from airborne.synthetic.throw.measurements import start_pose
 from airborne.synthetic.throw.pictures import background, linear_image
 from airborne.trial.file import read_trial

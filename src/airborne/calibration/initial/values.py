@@ -5,27 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from airborne.calibration.bundle import FreeParameters
-from airborne.calibration.diagnosis.control_points import check_inside
-from airborne.calibration.diagnosis.images import check_image_size
 from airborne.calibration.initial.chaining import Views, chain_cameras
 from airborne.calibration.initial.mirrored import find_mirrored_cameras
+from airborne.calibration.initial.reading import (
+    common_cameras,
+    detect_all_boards,
+    read_known_points,
+    read_sizes,
+    read_source_board,
+    read_start_rig,
+)
 from airborne.calibration.initial.wand import initial_rig_from_wand
 from airborne.calibration.initial.wand_fisheyes import initial_rig_from_wand_and_fisheyes
 from airborne.calibration.intrinsics.lens_selection import LENS_MODELS, LensFit, choose_lens, lenses_from_points
-from airborne.calibration.sources.board_detection import BoardDetections, detect_boards, detect_lens_board, image_size
-from airborne.calibration.sources.boards import Board, board_from_table, read_board
-from airborne.calibration.sources.control_points import ControlPoints, read_control_points
-from airborne.calibration.sources.files import CameraSource, Sources, SurveyTable
+from airborne.calibration.sources.board_detection import BoardDetections
+from airborne.calibration.sources.control_points import ControlPoints
+from airborne.calibration.sources.files import CameraSource, Sources
 from airborne.calibration.sources.scene_points import initial_rig_from_points
 from airborne.calibration.sources.wand import WandTracks
 from airborne.calibration.sources.wand_detection import find_wand
 from airborne.calibration.world_frame.alignment import merge_rigs
-from airborne.cameras import Camera, Detections, Rig, read_rig
+from airborne.cameras import Camera, Detections, Rig
 from airborne.cameras.detections import read_detections
 from airborne.cameras.finding import Finding
 from airborne.cameras.units import check_scales
 from airborne.errors import CalibrationError
-from airborne.types import Progress, StageProgress
+from airborne.types import StageProgress
 
 _MANY_OBSERVATIONS = 200  # observations of a camera that determine two lens terms without a board
 
@@ -55,18 +60,18 @@ class Inputs:
 
 def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     """Read all sources and find initial cameras; raises an AirborneError for what cannot be used."""
-    start_rig = _read_start(sources) if sources.start is not None else None
-    sizes = _sizes(sources, start_rig)
-    board = _board(sources)
+    start_rig = read_start_rig(sources) if sources.start is not None else None
+    sizes = read_sizes(sources, start_rig)
+    board = read_source_board(sources)
     board_detections, lens_views = None, {}
     if board is not None:
-        board_detections, lens_views = _detect_boards(
+        board_detections, lens_views = detect_all_boards(
             sources, board, lambda done, n: progress("looking for the board", done, n)
         )
     lenses = _fit_lenses(
         sources, board_detections=board_detections, lens_views=lens_views, sizes=sizes, progress=progress
     )
-    points = _read_points(sources, sizes)
+    points = read_known_points(sources, sizes)
     found = find_wand(sources, sizes, lambda done, n: progress("looking for the wand", done, n))
     wand = None if found is None else found.tracks
     fisheyes = [camera.name for camera in sources.camera if camera.lens == "fisheye"]
@@ -75,7 +80,7 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
         own = sources.detections
         detections = read_detections(sources.path(own.file), sources.names, own.cameras, skeleton=own.skeleton)
     for table in points.values() if start_rig is None else ():
-        unknown = [name for name in _common(table.cameras, sizes) if name not in lenses]
+        unknown = [name for name in common_cameras(table.cameras, sizes) if name not in lenses]
         lenses |= lenses_from_points(
             initial_rig_from_points(table.select(unknown), sizes, fisheyes=fisheyes),
             table,
@@ -86,7 +91,7 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
         known_lenses |= {camera.name: camera for camera in start_rig if camera.name not in known_lenses}
     start_of = {
         name: initial_rig_from_points(
-            table.select(_common(table.cameras, sizes)), sizes, known_lenses, fisheyes=fisheyes
+            table.select(common_cameras(table.cameras, sizes)), sizes, known_lenses, fisheyes=fisheyes
         )
         for name, table in points.items()
     }
@@ -140,67 +145,6 @@ def read_inputs(sources: Sources, progress: StageProgress) -> Inputs:
     )
 
 
-def _detect_boards(
-    sources: Sources, board: Board, progress: Progress
-) -> tuple[BoardDetections | None, dict[str, Views]]:
-    """Detect the board in the common recordings, and in those for one camera's lens."""
-    lens_views = {camera.name: detect_lens_board(sources, camera, board, progress) for camera in sources.camera}
-    is_together = any(camera.video or camera.pictures for camera in sources.camera)
-    seen_alone = {name: views for name, views in lens_views.items() if views is not None}
-    if not is_together and not seen_alone:
-        raise CalibrationError("[board] needs recordings: add video, pictures or lens_video to each [[camera]]")
-    return detect_boards(sources, board, progress) if is_together else None, seen_alone
-
-
-def _board(sources: Sources) -> Board | None:
-    table = sources.board
-    if table is None:
-        return None
-    if table.file is not None:
-        return read_board(sources.path(table.file))
-    keys = (
-        "kind",
-        "columns",
-        "rows",
-        "square_m",
-        "marker_m",
-        "dictionary",
-        "inverted",
-        "legacy",
-        "two_sided",
-        "thickness_m",
-    )
-    return board_from_table({key: v for key in keys if (v := getattr(table, key)) is not None}, "[board]")
-
-
-def _read_start(sources: Sources) -> Rig:
-    """Return the calibration of [start] in the recordings' own pixels."""
-    rig = read_rig(sources.path(sources.start.file if sources.start else ""))
-    cameras = []
-    for camera in sources.camera:
-        calibrated = replace(rig[camera.calibrated_as or camera.name], name=camera.name)
-        size = image_size(sources, camera)
-        du, dv = camera.saved_offset_px
-        if camera.saved_scale != 1 or (du, dv) != (0, 0):
-            scale = (camera.saved_scale, camera.saved_scale)
-            width, height = (round(length / camera.saved_scale) for length in calibrated.size)
-            calibrated = calibrated.resample(scale=scale, offset=(du, dv), size=size or (width, height))
-        for finding in check_image_size(camera.name, calibrated.size, size or calibrated.size):
-            raise CalibrationError(finding.sentence)
-        cameras.append(calibrated)
-    return Rig(tuple(cameras))
-
-
-def _sizes(sources: Sources, start_rig: Rig | None) -> dict[str, tuple[int, int]]:
-    sizes = {}
-    for camera in sources.camera:
-        size = start_rig[camera.name].size if start_rig is not None else image_size(sources, camera)
-        if size is None:
-            raise CalibrationError(f"camera '{camera.name}': give its video, or size = [width, height] in pixels")
-        sizes[camera.name] = size
-    return sizes
-
-
 def _fit_lenses(
     sources: Sources,
     *,
@@ -248,28 +192,6 @@ def _board_starts(views: Views, known_lenses: dict[str, Camera], *, alone_is_eno
         chain_cameras([known_lenses[views.cameras[c]] for c in group], views.select_cameras(group))[0]
         for group in groups
     ]
-
-
-def _read_points(sources: Sources, sizes: dict[str, tuple[int, int]]) -> dict[str, ControlPoints]:
-    """Read the points of known places; raises CalibrationError where one lies outside its image."""
-    points = {
-        name: read_control_points(sources.path(table.file), table.scene_points())
-        for name, table in sources.tables.items()
-        if isinstance(table, SurveyTable)
-    }
-    for table in points.values():
-        for camera in _common(table.cameras, sizes):
-            check_inside(table, camera, sizes)
-    return points
-
-
-def _common(cameras: tuple[str, ...], sizes: dict[str, tuple[int, int]]) -> list[str]:
-    names = [name for name in cameras if name in sizes]
-    if not names:
-        raise CalibrationError(
-            f"the points are clicked in {', '.join(cameras)}; the cameras are {', '.join(sizes)}: use the same names"
-        )
-    return names
 
 
 def _with_lens(camera: Camera, fit: LensFit | None) -> Camera:

@@ -32,7 +32,8 @@ from airborne.reproduction.rigid.somersaults import (
     make_experiment,
     track_experiment,
 )
-from airborne.synthetic.flight.somersault import N_POSES, Target
+from airborne.synthetic.flight.skill import N_POSES
+from airborne.synthetic.flight.somersault import Target
 from airborne.types import Progress
 
 _CROP_M, _THUMBNAIL_PX = 2.4, 120  # of an image of fig. 4

@@ -20,7 +20,8 @@ from airborne.geometry.rotations import angles_from_matrix, unwrap
 from airborne.io.writing import write_text
 from airborne.synthetic.flight.articulated import Takeoff
 from airborne.synthetic.flight.rigid import SampledFlight
-from airborne.synthetic.flight.somersault import PictureStyle, Skill, SomersaultPreset, Target, somersault_scene
+from airborne.synthetic.flight.skill import Skill
+from airborne.synthetic.flight.somersault import PictureStyle, SomersaultPreset, Target, somersault_scene
 from airborne.synthetic.throw.measurements import control_points, digitise, lights_table, start_pose
 from airborne.synthetic.throw.pictures import scene_frames
 from airborne.synthetic.throw.scene import Scene, ThrowPreset, cross_scene
