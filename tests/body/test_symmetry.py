@@ -159,3 +159,50 @@ def test_of_poses_that_look_alike_the_least_turned_is_taken_whichever_is_found(t
     for each in taken:
         assert each.magnitude() == pytest.approx(min(other.magnitude() for other in alike))
         assert (each.inv() * taken[0]).magnitude() < ROUNDTRIP
+
+
+def turned(profile, sides=24, offset=0.0):
+    """A mesh turned about z: profile (n, 2) of radius and height, closed by the axis at both ends."""
+    angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    rings = [[(r * np.cos(a) + offset, r * np.sin(a), z) for a in angles] for r, z in profile]
+    vertices = np.array(rings).reshape(-1, 3)
+    faces = []
+    for ring in range(len(profile) - 1):
+        for k in range(sides):
+            a, b = ring * sides + k, ring * sides + (k + 1) % sides
+            faces += [(a, b, a + sides), (b, b + sides, a + sides)]
+    return Mesh(vertices, np.array(faces))
+
+
+CLUB = [(0.0, 0.0), (0.015, 0.0), (0.012, 0.2), (0.05, 0.4), (0.03, 0.5), (0.0, 0.5)]
+BALL = [(0.1 * np.sin(a), -0.1 * np.cos(a)) for a in np.linspace(0, np.pi, 16)]
+
+
+def test_mesh_that_was_turned_has_its_axis():
+    handle, head = turned(CLUB[:4]), turned(CLUB[3:])
+    np.testing.assert_array_equal(continuous_axes(body(part(handle), part(head, colour=BLUE))), [[0, 0, 1]])
+
+
+def test_turned_mesh_lies_along_the_axis_of_a_spheroid():
+    upright, across = part(ellipsoid(0.02, 0.02, 0.1)), part(ellipsoid(0.1, 0.02, 0.02))
+    np.testing.assert_array_equal(np.abs(continuous_axes(body(part(turned(CLUB)), upright))), [[0, 0, 1]])
+    assert len(continuous_axes(body(part(turned(CLUB)), across))) == 0
+
+
+def test_mesh_of_a_ball_looks_the_same_about_every_axis():
+    assert len(continuous_axes(body(part(turned(BALL, sides=32))))) == 3
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [part(turned(CLUB, sides=6))],
+        [part(turned(CLUB, offset=0.02))],
+        [part(Mesh(CUBE_VERTICES, CUBE_FACES))],
+        [part(turned(CLUB)), part(box(0.1, 0.1, 0.1))],
+        [part(turned(CLUB)), part(ellipsoid(0.02, 0.02, 0.02), (0.1, 0, 0))],
+    ],
+    ids=["six sides", "beside its origin", "cube", "with a box", "with a knob"],
+)
+def test_mesh_that_is_not_round_has_no_axis(parts):
+    assert len(continuous_axes(body(*parts))) == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -9,12 +10,20 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from airborne.body.model import BodyModel, Box, Ellipsoid, Part, Pose
+from airborne.body.model import BodyModel, Box, Ellipsoid, Mesh, Part, Pose
 from airborne.types import Array
 
 _SAME_POINT_M = 1e-6  # rounding of coordinates in body files
 _SAME_MOMENT_M2 = 1e-7  # rounding of second moments of area
 _SAME_COLOUR = 1.0  # grey levels
+# of its largest radius, by which a mesh may be out of round: as flat as the sides of a circle drawn with 16; chosen, a
+# third of a pixel of a ball at 160 pixels a metre
+_OUT_OF_ROUND = 0.02
+_MOST_FACES = 20_000  # of a mesh whose faces are looked at within, chosen: finer ones at their centres alone
+_INSIDE = (
+    np.array([(i, j, 14 - i - j) for i in range(1, 14, 3) for j in range(1, 14 - i, 3)]) + 1 / 3
+) / 15  # of a face
+_ANGLES_RAD, _MOST_SAMPLES = (0.7, 1.9, 3.3), 0.99  # chosen: no fractions of a turn; of the samples, edges left out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,19 +80,42 @@ def least_turned_pose(model: BodyModel, pose: Pose) -> Pose:
 def continuous_axes(model: BodyModel) -> Array:
     """Find the axes through the root's origin about which no rotation is visible: unit rows (k, 3), root's frame.
 
-    None for most bodies, one for spheroids and spheres lined up, and all three where every axis is one (a ball).
+    None for most bodies, one for spheroids, spheres and turned meshes lined up, and all three where every axis is one
+    (a ball). A mesh may be a little out of round, as circles of 16 sides are.
     """
+    solids, shapes = _solids(model), [part.shape for part in model.parts]
+    exact = _axes_of_ellipsoids(
+        [each for each, shape in zip(solids, shapes, strict=True) if isinstance(shape, Ellipsoid)]
+    )
+    if exact is None or any(isinstance(shape, Box) for shape in shapes):
+        return np.zeros((0, 3))
+    posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
+    meshes = [
+        _sample_mesh(
+            part.shape, R @ part.segment_from_part.rotation.as_matrix(), R @ part.segment_from_part.translation + t
+        )
+        for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True)
+        for part in segment.parts
+        if isinstance(part.shape, Mesh)
+    ]
+    if not meshes:
+        return exact
+    candidates = exact if len(exact) == 1 else _principal_axes(np.concatenate(meshes))
+    axes = [axis for axis in candidates if all(_is_round(mesh, axis) for mesh in meshes)]
+    return np.eye(3) if len(axes) > 1 else np.array(axes).reshape(-1, 3)
+
+
+def _axes_of_ellipsoids(solids: Sequence[_Solid]) -> Array | None:
+    """Return the axis that all have in common (1, 3), all three where every axis is one, None where there is none."""
     axes: list[Array] = []  # directions that a symmetry axis must have
-    for part, solid in zip(model.parts, _solids(model), strict=True):
-        if not isinstance(part.shape, Ellipsoid):
-            return np.zeros((0, 3))
+    for solid in solids:
         centre = solid.points[0]
         if np.linalg.norm(centre) > _SAME_POINT_M:
             axes.append(centre / np.linalg.norm(centre))
         variances, directions = np.linalg.eigh(solid.moment)
         steps = np.diff(np.sqrt(variances)) > _SAME_POINT_M
         if steps.all():
-            return np.zeros((0, 3))
+            return None
         if steps.any():
             axes.append(directions[:, 0] if steps[0] else directions[:, 2])
         if len(solid.points) > 1:
@@ -92,7 +124,41 @@ def continuous_axes(model: BodyModel) -> Array:
     if not axes:
         return np.eye(3)
     is_one_axis = all(np.linalg.norm(np.cross(axes[0], axis)) < _SAME_POINT_M for axis in axes)
-    return axes[0][None] if is_one_axis else np.zeros((0, 3))
+    return axes[0][None] if is_one_axis else None
+
+
+def _sample_mesh(mesh: Mesh, R: Array, t: Array) -> Array:
+    """Return points of a mesh's faces with their normals and areas: (n, 7), in the root's frame."""
+    corners = mesh.vertices_m[mesh.faces] @ R.T + t
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(normals, axis=1, keepdims=True)
+    inside = _INSIDE if len(corners) <= _MOST_FACES else np.full((1, 3), 1 / 3)
+    points = np.einsum("pk,fkx->fpx", inside, corners)
+    of_face = np.concatenate([normals / np.maximum(twice, 1e-18), twice / 2 / len(inside)], axis=1)
+    return np.concatenate([points, np.repeat(of_face[:, None], len(inside), axis=1)], axis=2).reshape(-1, 7)
+
+
+def _principal_axes(samples: Array) -> Array:
+    """Return the axes (3, 3), rows, of the surfaces' second moments about the origin, each upright if it nearly is."""
+    points, areas = samples[:, :3], samples[:, 6:]
+    _, directions = np.linalg.eigh((points * areas).T @ points)
+    nearest = np.eye(3)[np.argmax(np.abs(directions), axis=0)]
+    is_near = np.abs(np.sum(nearest * directions.T, axis=1)) > np.cos(_OUT_OF_ROUND)
+    return np.where(is_near[:, None], nearest, directions.T)
+
+
+def _is_round(samples: Array, axis: Array) -> bool:
+    """Whether a mesh, by samples of its surface, coincides with itself however it is rotated about an axis."""
+    points, normals = samples[:, :3], samples[:, 3:6]
+    most_m = _OUT_OF_ROUND * float(np.linalg.norm(np.cross(points, axis), axis=1).max())
+    tree = KDTree(points)
+    for angle in _ANGLES_RAD:
+        rotated = points @ Rotation.from_rotvec(angle * axis).as_matrix().T
+        _, nearest = tree.query(rotated)
+        off_m = np.abs(np.sum((rotated - points[nearest]) * normals[nearest], axis=1))
+        if np.quantile(off_m, _MOST_SAMPLES) > most_m:
+            return False
+    return True
 
 
 def _solids(model: BodyModel) -> list[_Solid]:

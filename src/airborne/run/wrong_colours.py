@@ -20,6 +20,9 @@ _FEWEST_PX = 20  # chosen: of a part, that say its colour
 # with their colours in another order or inverted 67 to 99; of four synthetic throws 8 to 14, of a blue or green file 92
 # to 144
 _MOST_OFF = 35.0
+# least and most of a part's own brightness over the body's, chosen: of a matt thing one side faces a window, the other
+# the floor, and a glossy one mirrors a lamp
+_DARKEST, _BRIGHTEST = 0.5, 2.0
 _N_NAMED = 3  # parts, chosen
 _OF_PERSON = "is it another person's file, or in other clothes", "Fit it anew (airborne fit-body)"
 _OF_THING = "is it another thing's file, or are red and blue exchanged in the videos", "Correct the file"
@@ -61,7 +64,9 @@ def _seen_colours(model: BodyModel, shown: Iterable[tuple[Frames, Pose]]) -> tup
 
 
 def _differences(own: Array, seen: Array, weights: Array) -> tuple[Array, float]:
-    """Return how far colours (parts, 3) lie from those seen, up to one factor: of each part (parts,), and in all."""
-    brightness = np.sum(weights[:, None] * own * seen) / max(np.sum(weights[:, None] * own**2), 1.0)
-    off = np.sqrt(np.mean((seen - brightness * own) ** 2, axis=1))
+    """Return how far colours (parts, 3) lie from those seen, however brightly each is lit: (parts,), and in all."""
+    whole = np.sum(weights[:, None] * own * seen) / max(np.sum(weights[:, None] * own**2), 1.0)
+    lit = np.sum(own * seen, axis=1) / np.maximum(np.sum(own**2, axis=1), 1.0)
+    lit = np.clip(lit, _DARKEST * whole, _BRIGHTEST * whole)
+    off = np.sqrt(np.mean((seen - lit[:, None] * own) ** 2, axis=1))
     return off, float(np.sqrt(np.sum(weights * off**2) / weights.sum()))

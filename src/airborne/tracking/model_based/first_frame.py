@@ -28,7 +28,8 @@ def fit_first(fitter: Fitter, start: Pose, frames: Frames, prior: PosePrior | No
     if not learned.masks.regions:
         return None
     poses = [fitter.fit_silhouettes(pose, learned, FAR, prior) for pose in (start, *fitter.swap_limbs(start))]
-    fit = fitter.fit_images([*poses, *fitter.swap_limbs(poses[0])], learned, prior)
+    beside = fitter.swap_limbs(poses[0]) if fitter.moves_joints else [start]  # which tells sides, and colours, apart
+    fit = fitter.fit_images([*poses, *beside], learned, prior)
     if not fitter.moves_joints:
         regions, known = learned.masks.regions, learned.appearance
         learned = replace(learned, appearance=learn_blurs(render_model, fit.pose, regions, known))

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from airborne.appearance.model import Appearance
 from airborne.body import Pose
+from airborne.body.chain import delta_between
 from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit
@@ -16,6 +19,7 @@ from airborne.tracking.model_based.status import Reference
 from airborne.video import Frames
 
 MARGIN_PX = 32  # of a full frame
+_SAME_M, _SAME_RAD = 0.008, 0.035  # silhouettes and images of a right fit agree this closely
 
 
 def regions_near(fitter: Fitter, poses: Sequence[Pose], frames: Frames, appearance: Appearance) -> LearnedRegions:
@@ -51,8 +55,17 @@ def fit_next(
     expected, agreement = max(judged, key=lambda each: each[1].evidence)
     levels = CLOSE_JOINTED if fitter.moves_joints else CLOSE
     levels = NEAR if agreement.is_suspect(reference) else levels
-    fit = fitter.fit_images([fitter.fit_silhouettes(expected, learned, levels, prior)], learned, prior)
+    starts = [fitter.fit_silhouettes(expected, learned, levels, prior)]
+    if not fitter.moves_joints and not is_same(starts[0], expected):
+        starts.append(expected)  # silhouettes do not tell colours apart: a round thing turns under them
+    fit = fitter.fit_images(starts, learned, prior)
     swaps = [pose for pose in fitter.swap_limbs(fit.pose) if is_nearer(fitter.model, pose, fit.pose, expected)]
     if swaps:
         fit = fitter.fit_images([fit.pose, *swaps], learned, prior)
     return fitter.judge(fit, predicted, learned, prior, searched=searched)
+
+def is_same(pose: Pose, other: Pose) -> bool:
+    """Whether two poses are the same as far as silhouettes and images of a right fit agree."""
+    delta = delta_between(pose, other)
+    rotations = np.linalg.norm(delta[3:].reshape(-1, 3), axis=1)
+    return bool(np.linalg.norm(delta[:3]) < _SAME_M and np.all(rotations < _SAME_RAD))

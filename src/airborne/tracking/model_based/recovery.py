@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from airborne.appearance.model import Appearance
 from airborne.body import Pose
-from airborne.body.chain import delta_between
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit
 from airborne.tracking.model_based.gauss_newton import NEAR
 from airborne.tracking.model_based.global_search import SearchRange, search_globally
-from airborne.tracking.model_based.later_frames import regions_near
+from airborne.tracking.model_based.later_frames import is_same, regions_near
 from airborne.video import Frames
 
 # divides the proposals of a search about a fit that may be right: on seven synthetic throws as many of 840 starts up to
@@ -20,7 +17,6 @@ from airborne.video import Frames
 _THRIFT = 4
 _N_FITTED = 3  # of the poses found
 _N_CONFIRM = 2  # of the best poses found that lead back to a fit confirm it
-_SAME_M, _SAME_RAD = 0.008, 0.035  # silhouettes and images of a right fit agree this closely
 
 
 def recover(
@@ -60,10 +56,3 @@ def recover(
     best = sorted(poses, key=evidence, reverse=True)[:_N_FITTED]
     fit = max((fitter.fit_images([pose], learned, None) for pose in best), key=lambda fit: evidence(fit.pose))
     return fitter.judge(fit, candidates, learned, None)
-
-
-def is_same(pose: Pose, other: Pose) -> bool:
-    """Whether two poses are the same as far as silhouettes and images of a right fit agree."""
-    delta = delta_between(pose, other)
-    rotations = np.linalg.norm(delta[3:].reshape(-1, 3), axis=1)
-    return bool(np.linalg.norm(delta[:3]) < _SAME_M and np.all(rotations < _SAME_RAD))

@@ -26,12 +26,12 @@ from airborne.tracking.model_based.exposure import Extrapolation, fit_exposed
 from airborne.tracking.model_based.first_frame import fit_first
 from airborne.tracking.model_based.fitter import Fitter, JudgedFit, Order
 from airborne.tracking.model_based.image_evidence import ImageEvidence, linearise_evidence
-from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, regions_near
+from airborne.tracking.model_based.later_frames import MARGIN_PX, fit_next, is_same, regions_near
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.learning import learn_appearance
 from airborne.tracking.model_based.lens_blur import learn_blurs
 from airborne.tracking.model_based.misplaced_limbs import is_same_place
-from airborne.tracking.model_based.recovery import is_same, recover
+from airborne.tracking.model_based.recovery import recover
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference, doubts_of, is_lost
 from airborne.tracking.model_based.support import mark_unobserved, shrink_unobserved, widen_unseen
