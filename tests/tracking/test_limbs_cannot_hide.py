@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from airborne.tracking.image_regions import crop_regions
 from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of
 from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator
@@ -12,7 +13,7 @@ from airborne.tracking.model_based.mask_faults import find_mask_faults
 from airborne.tracking.model_based.support import count_views, mark_unobserved, widen_unseen
 from airborne.tracking.model_based.uncovered import find_uncovered
 from tests.support.people import HUMAN
-from tests.tracking.test_misplaced_limb import FOLDS, LearnedFrame, fold
+from tests.tracking.test_misplaced_limb import FOLDS, LearnedFrame, fold, limb_with
 
 NAMES = [segment.name for segment in HUMAN.segments]
 
@@ -120,3 +121,37 @@ def test_what_is_marked_unobserved_is_infinite_and_uncorrelated():
     assert marked[1, 1] == np.inf
     np.testing.assert_array_equal(marked[1, [0, 2, 3]], 0)
     np.testing.assert_array_equal(marked[np.ix_([0, 2, 3], [0, 2, 3])], 2)
+
+
+@pytest.fixture
+def appearance_with_arms(frame):
+    render_model, limb = frame.render_model, limb_with("upper_arm_left")
+    body, appearance = render_model.with_pose(frame.truth), frame.appearance
+    for region in crop_regions([body], render_model.geometry, frame.frames, 32):
+        is_arm = render_model.shows_segments(render_model.draw_parts(body, region), limb)
+        appearance = appearance.learn_limb_colours(region, "shoulder", is_arm)
+    return appearance
+
+
+def test_what_an_arm_covers_has_to_look_like_an_arm(frame, appearance_with_arms):
+    """Any of the body's colours is evidence for the body; for an arm, those of arms are."""
+    render_model, posed = frame.render_model, frame.render_model.with_pose(frame.truth)
+    for region in crop_regions([posed], render_model.geometry, frame.frames, 32):
+        part = render_model.draw_parts(posed, region)
+        own = appearance_with_arms.limb_posterior(region, "shoulder")
+        any_of_body = appearance_with_arms.posterior(region)
+        for names, is_like_arm in ((("forearm_left", "hand_left"), True), (("pelvis", "thigh_left"), False)):
+            pixels = render_model.shows_segments(part, [HUMAN.index_of(name) for name in names])
+            rises = np.median(own[pixels] - any_of_body[pixels])
+            assert (rises >= -1e-3) == is_like_arm, (region.camera.name, names, rises)
+
+
+def test_masks_of_two_places_of_a_limb_are_compared_by_its_own_colours(frame, appearance_with_arms):
+    pose, limb = frame.truth, limb_with("upper_arm_left")
+    learned, of_arms = (
+        LearnedRegions(Posteriors(*frame.views(pose)), each) for each in (frame.appearance, appearance_with_arms)
+    )
+    assert learned.mask_evidence(frame.render_model, pose, limb) == learned.mask_evidence(
+        frame.render_model, pose, None
+    )
+    assert of_arms.mask_evidence(frame.render_model, pose, limb) > of_arms.mask_evidence(frame.render_model, pose, None)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from airborne.body import BodyModel, Pose, PosedBody
 from airborne.body.chain import angles_of, delta_between, move_pose, segment_jacobians, separation_rows
 from airborne.body.contact import contact_model, overlaps
+from airborne.body.sides import without_side
 from airborne.geometry.joint_rotations import rotations_of
 from airborne.geometry.swing_twist import swing_twist_from_matrix, swing_twist_jacobian
 from airborne.tracking.evidence import PoseEvidence
@@ -242,6 +243,20 @@ def limbs_of(model: BodyModel) -> tuple[NDArray[np.int64], ...]:
     limb = limb_of_segment(model)
     limbs = [np.flatnonzero(limb == each) for each in np.unique(limb[limb >= 0])]
     return tuple(each for each in limbs if len(each) > 1)
+
+
+@lru_cache(maxsize=16)
+def limbs_by_pair(model: BodyModel) -> dict[str, NDArray[np.int64]]:
+    """Return the segments of each pair of limbs, by `pair_name`; not to be written to."""
+    pairs: dict[str, list[NDArray[np.int64]]] = {}
+    for limb in limbs_of(model):
+        pairs.setdefault(pair_name(model, limb), []).append(limb)
+    return {pair: np.concatenate(limbs) for pair, limbs in pairs.items()}
+
+
+def pair_name(model: BodyModel, limb: NDArray[np.int64]) -> str:
+    """Return what a limb and that on the other side are called: as its first segment, without its side."""
+    return without_side(model.segments[limb[0]].name)
 
 
 def joints_of(model: BodyModel, segments: NDArray[np.integer]) -> DegreesOfFreedom:

@@ -16,6 +16,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     PosePrior,
     joints_of,
     limbs_of,
+    pair_name,
     proximal_to_distal,
     root_only,
 )
@@ -40,6 +41,7 @@ from airborne.tracking.model_based.misplaced_limbs import (
     search_limb,
     with_limb,
 )
+from airborne.tracking.model_based.place_costs import best_place, improbable_nats
 from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import MaskAgreement, mask_agreement
 from airborne.tracking.model_based.support import count_views
@@ -47,8 +49,6 @@ from airborne.types import Array
 
 Order = Literal["refined", "joint", "hierarchical"]
 
-# what a limb costs that is not where it was expected; of synthetic limbs moved at 7, a third more were wrong
-LOST_NATS = 10.0
 # of evidence that a mask gains at least where a new fit of the whole body is better: of 153 such fits, of three
 # synthetic people and two recorded ones, the 29 that were taken had gained 5.3 or more
 _RISEN_NATS = 4.0
@@ -148,16 +148,6 @@ class Fitter:
             n_views_of[limb] = np.minimum(n_views_of[limb], 1)
         return JudgedFit(fit, replace(self.agreement(fit.pose, learned), misplaced=segments, n_views_of=n_views_of))
 
-    def place_cost(self, fit: Fit, learned: LearnedRegions, misfit: float, prior: PosePrior | None) -> float:
-        """Return minus the log-probability of a fit among others that have a limb elsewhere [nat].
-
-        The images alone do not tell an uncovered limb from one of a slightly different shade: both residuals are
-        beyond what counts. So the mask's evidence counts too, a patch of pixels as one. A trunk that is twisted to its
-        limits, or crossed legs, are as unlikely as a lost limb.
-        """
-        of_mask = self.agreement(fit.equations.pose, learned).evidence / fit.equations.shared
-        return fit.objective(misfit, prior) - of_mask + self._improbable_nats(fit.pose)
-
     def _views(self, poses: Sequence[Pose], learned: LearnedRegions) -> list[ImageView]:
         bodies = [self.render_model.with_pose(pose) for pose in poses]
         return learned.make_image_views(self.render_model, bodies, are_narrow=not self.moves_joints)
@@ -232,15 +222,11 @@ class Fitter:
         poses = [self.fit_silhouettes(start, learned, NEAR, widened) for start in starts]
 
         def mask_nats(pose: Pose) -> float:
-            return self.agreement(pose, learned).evidence / fit.equations.shared - self._improbable_nats(pose)
+            return self.agreement(pose, learned).evidence / fit.equations.shared - improbable_nats(self.model, pose)
 
         least = mask_nats(fit.pose) + _RISEN_NATS
         fits = [self.fit_images([pose], learned, widened) for pose in poses if mask_nats(pose) > least]
-        return self._best_place(fit, fits, learned, prior=prior, widened=widened, n_lost=n_lost)
-
-    def _improbable_nats(self, pose: Pose) -> float:
-        """Return what a pose costs that people hardly ever are in [nat]."""
-        return LOST_NATS * (self.moves_joints and turned_pelvis.is_improbable(self.model, pose))
+        return best_place(self.render_model, [fit, *fits], learned, prior=prior, widened=widened, n_lost=n_lost)
 
     def _refit_limb(
         self,
@@ -257,33 +243,17 @@ class Fitter:
         somersaults no second place was better. The prior is returned too, wide for a limb that was moved.
         """
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
-        args = self.render_model, [fit.pose, *expected], limb, learned.evidence
+        args = self.render_model, [fit.pose, *expected], limb, learned.limb_evidence(pair_name(self.model, limb))
         places = search_limb(*args, shared=fit.equations.shared)
         dofs, masks, coarse = joints_of(self.model, limb), learned.masks, len(NEAR) - 1
         poses = [fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs) for pose in places]
-        best = max(poses, key=lambda pose: self.agreement(pose, learned).evidence)
+        best = max(poses, key=lambda pose: learned.mask_evidence(self.render_model, pose, limb))
         best = fit_silhouettes(self.render_model, best, masks, levels=NEAR[coarse:], dofs=dofs)
         if limb_distance(self.model, fit.pose, best, limb) < SAME_M:
             return fit, prior
         widened = None if prior is None else prior.widen(dofs.columns)
-        return self._best_place(fit, [self.fit_images([best], learned, widened)], learned, prior=prior, widened=widened)
-
-    def _best_place(
-        self,
-        fit: Fit,
-        others: Sequence[Fit],
-        learned: LearnedRegions,
-        *,
-        prior: PosePrior | None,
-        widened: PosePrior | None,
-        n_lost: int = 1,
-    ) -> tuple[Fit, PosePrior | None]:
-        """Return a fit, or one that is better with n limbs away from where they were expected, each with its prior."""
-        misfit, lost = min(each.equations.misfit for each in (fit, *others)), n_lost * LOST_NATS
-        costs = [self.place_cost(each, learned, misfit, widened) + lost for each in (fit, *others)]
-        stays = min(self.place_cost(fit, learned, misfit, prior), costs[0])
-        best = int(np.argmin(costs))
-        return ((fit, *others)[best], widened) if costs[best] < stays else (fit, prior)
+        moved = self.fit_images([best], learned, widened)
+        return best_place(self.render_model, [fit, moved], learned, prior=prior, widened=widened, limb=limb)
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]

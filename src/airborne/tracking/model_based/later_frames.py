@@ -64,6 +64,7 @@ def fit_next(
         fit = fitter.fit_images([fit.pose, *swaps], learned, prior)
     return fitter.judge(fit, predicted, learned, prior, searched=searched)
 
+
 def is_same(pose: Pose, other: Pose) -> bool:
     """Whether two poses are the same as far as silhouettes and images of a right fit agree."""
     delta = delta_between(pose, other)
