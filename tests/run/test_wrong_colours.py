@@ -54,3 +54,13 @@ def test_a_thing_with_the_colours_of_another_is_named():
     assert find_wrong_colours(CROSS, Motion.collect(seen), frames) == []
     (sentence,) = find_wrong_colours(CROSS.with_colours(own[:, ::-1]), Motion.collect(seen), frames)
     assert "red and blue exchanged" in sentence and "fit-body" not in sentence
+
+
+def test_a_part_in_the_shade_is_not_taken_for_another_colour():
+    scene = Scene()
+    frames = [scene.frames(index) for index in (0, 4)]
+    posed = {"status": Status.TRACKED, "covariance": np.eye(6) * 1e-5, "score": 5.0, "n_views": 4}
+    seen = [Estimate(index=f.index, time_s=f.time_s, pose=scene.start(f.index), **posed) for f in frames]
+    own = np.array([part.colour for part in CROSS.parts])
+    lit = own * np.array([[0.6], [1.15], [1.15]])
+    assert find_wrong_colours(CROSS.with_colours(np.clip(lit, 0, 255)), Motion.collect(seen), frames) == []
