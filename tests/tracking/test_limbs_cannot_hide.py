@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airborne.tracking.image_regions import crop_regions
-from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of
+from airborne.tracking.model_based.degrees_of_freedom import all_joints, limbs_of, pair_of_segment
 from airborne.tracking.model_based.fitter import Fitter
 from airborne.tracking.model_based.gauss_newton import Posteriors, image_evaluator
 from airborne.tracking.model_based.image_views import make_image_views
@@ -15,6 +15,7 @@ from airborne.tracking.model_based.uncovered import find_uncovered
 from tests.support.people import HUMAN
 from tests.tracking.test_misplaced_limb import FOLDS, LearnedFrame, fold, limb_with
 
+ARMS = pair_of_segment(HUMAN)[HUMAN.index_of("forearm_left")]
 NAMES = [segment.name for segment in HUMAN.segments]
 
 
@@ -125,11 +126,11 @@ def test_what_is_marked_unobserved_is_infinite_and_uncorrelated():
 
 @pytest.fixture
 def appearance_with_arms(frame):
-    render_model, limb = frame.render_model, limb_with("upper_arm_left")
-    body, appearance = render_model.with_pose(frame.truth), frame.appearance
+    render_model, appearance = frame.render_model, frame.appearance
+    body, pairs = render_model.with_pose(frame.truth), pair_of_segment(HUMAN)
     for region in crop_regions([body], render_model.geometry, frame.frames, 32):
-        is_arm = render_model.shows_segments(render_model.draw_parts(body, region), limb)
-        appearance = appearance.learn_limb_colours(region, "shoulder", is_arm)
+        part = render_model.draw_parts(body, region)
+        appearance = appearance.learn_limb_colours(region, part, np.append(pairs[render_model.segment_of_part], -1))
     return appearance
 
 
@@ -138,7 +139,7 @@ def test_what_an_arm_covers_has_to_look_like_an_arm(frame, appearance_with_arms)
     render_model, posed = frame.render_model, frame.render_model.with_pose(frame.truth)
     for region in crop_regions([posed], render_model.geometry, frame.frames, 32):
         part = render_model.draw_parts(posed, region)
-        own = appearance_with_arms.limb_posterior(region, "shoulder")
+        own = appearance_with_arms.limb_posterior(region, ARMS)
         any_of_body = appearance_with_arms.posterior(region)
         for names, is_like_arm in ((("forearm_left", "hand_left"), True), (("pelvis", "thigh_left"), False)):
             pixels = render_model.shows_segments(part, [HUMAN.index_of(name) for name in names])

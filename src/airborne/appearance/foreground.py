@@ -38,13 +38,18 @@ def count_colours(rgb, chosen, stride, counts, reach=1):
             if n_chosen % stride:
                 continue
             taken += 1
-            r, g, b = rgb[y, x, 0] >> 3, rgb[y, x, 1] >> 3, rgb[y, x, 2] >> 3
-            for i in range(-reach, reach + 1):
-                for j in range(-1, 2):
-                    for k in range(-1, 2):
-                        ri, gj, bk = min(max(r + i, 0), 31), min(max(g + j, 0), 31), min(max(b + k, 0), 31)
-                        counts[ri, gj, bk] += _KERNEL[i + 1] * _KERNEL[j + 1] * _KERNEL[k + 1]
+            _count_colour(rgb[y, x, 0] >> 3, rgb[y, x, 1] >> 3, rgb[y, x, 2] >> 3, reach, counts)
     return taken
+
+
+@kernel
+def _count_colour(r, g, b, reach, counts):
+    """Add one pixel's colour, blurred over the bins around its own, to counts (32, 32, 32)."""
+    for i in range(-reach, reach + 1):
+        for j in range(-1, 2):
+            for k in range(-1, 2):
+                ri, gj, bk = min(max(r + i, 0), 31), min(max(g + j, 0), 31), min(max(b + k, 0), 31)
+                counts[ri, gj, bk] += _KERNEL[i + 1] * _KERNEL[j + 1] * _KERNEL[k + 1]
 
 
 @kernel(fastmath=True)
@@ -70,6 +75,34 @@ def blend_colours(rgb, chosen, stride, rate, old, out):
                 count = own[j, k] + _HALF * (before[j, k] + after[j, k])
                 out[i, j, k] = keep * old[i, j, k] + share * count
     return taken
+
+
+@kernel
+def count_limb_colours(rgb, part, pair_of_part, most, counts, taken):
+    """Count the colours of pairs of limbs in counts (pairs, 32, 32, 32), and in taken (pairs,) how many pixels.
+
+    rgb (h, w, 3) uint8; part (h, w), -1 where none; pair_of_part (parts + 1,), -1 of none, which is the last. Pixels
+    count between two of the same pair along a row, of a pair about `most`.
+    """
+    h, w = part.shape
+    n_pairs = len(counts)
+    seen = np.zeros(n_pairs, np.int64)
+    for y in range(h):
+        for x in range(w):
+            pair = pair_of_part[part[y, x]]
+            if pair >= 0:
+                seen[pair] += 1
+    stride = np.maximum(seen // most, 1)
+    seen[:] = 0
+    for y in range(h):
+        for x in range(1, w - 1):
+            pair = pair_of_part[part[y, x]]
+            if pair < 0 or pair_of_part[part[y, x - 1]] != pair or pair_of_part[part[y, x + 1]] != pair:
+                continue
+            seen[pair] += 1
+            if seen[pair] % stride[pair] == 0:
+                taken[pair] += 1
+                _count_colour(rgb[y, x, 0] >> 3, rgb[y, x, 1] >> 3, rgb[y, x, 2] >> 3, 1, counts[pair])
 
 
 @kernel(fastmath=True)

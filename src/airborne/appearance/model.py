@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airborne.appearance.background import BackgroundModel, BackgroundPixels, FirstImage
 from airborne.appearance.brightness import brightness_ratios, divide_brightness
-from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, posterior
+from airborne.appearance.foreground import BINS_PER_CHANNEL, blend_colours, count_limb_colours, posterior
 from airborne.cameras import Camera
 from airborne.types import Array32
 from airborne.video import View
@@ -59,8 +59,7 @@ class Appearance:
 
     body_histograms: Histograms = field(default_factory=dict)
     background_histograms: Histograms = field(default_factory=dict)
-    # of a pair of limbs, arms or legs: (camera name, name of its first segments) -> (32, 32, 32) probabilities
-    limb_histograms: Mapping[tuple[str, str], Array32] = field(default_factory=dict)
+    limb_histograms: Histograms = field(default_factory=dict)  # of pairs of limbs (pairs, ...), zero where unknown
     backgrounds: Mapping[tuple[str, bytes], BackgroundModel] = field(default_factory=dict)  # by source
     # camera name -> (k,) what the images of the body have cost, drawn with each of LENS_BLURS_PX
     blur_costs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -91,13 +90,24 @@ class Appearance:
             background_histograms=_learn_histogram(self.background_histograms, region, clear),
         )
 
-    def learn_limb_colours(self, region: Region, pair: str, mask: NDArray[np.bool_]) -> Appearance:
-        """Learn the colours of a pair of limbs inside the core of their mask (h, w)."""
-        core = cv2.erode(mask.astype(np.uint8), np.ones((1, 3), np.uint8)) > 0
-        name, key = region.camera.name, (region.camera.name, pair)
-        known = {name: self.limb_histograms[key]} if key in self.limb_histograms else {}
-        learned = _learn_histogram(known, region, core)
-        return replace(self, limb_histograms={**self.limb_histograms, key: learned[name]}) if learned else self
+    def learn_limb_colours(
+        self, region: Region, part: NDArray[np.integer], pair_of_part: NDArray[np.integer]
+    ) -> Appearance:
+        """Learn the colours of each pair of limbs, arms or legs, from the part that each pixel shows (h, w), or -1.
+
+        pair_of_part (parts + 1,): the pair's number of each part and, last, of none; -1 where there is no pair.
+        """
+        n_pairs, bins, name = int(pair_of_part.max(initial=-1)) + 1, (BINS_PER_CHANNEL,) * 3, region.camera.name
+        if n_pairs == 0:
+            return self
+        counts, taken = np.zeros((n_pairs, *bins), np.float32), np.zeros(n_pairs, np.int64)
+        count_limb_colours(region.rgb, part, pair_of_part, _SAMPLES, counts, taken)
+        old = self.limb_histograms.get(name)
+        histograms = np.zeros_like(counts) if old is None else old.copy()
+        for pair in np.flatnonzero(taken >= _FEWEST):
+            rate = _COLOUR_RATE if histograms[pair].any() else 1.0
+            histograms[pair] += np.float32(rate) * (counts[pair] / np.float32(taken[pair]) - histograms[pair])
+        return replace(self, limb_histograms={**self.limb_histograms, name: histograms})
 
     def learn_background(self, region: Region, mask: NDArray[np.bool_], *, whole_view: bool = True) -> Appearance:
         """Learn the background wherever the body is not: at first in the whole view, else in the region alone."""
@@ -138,13 +148,13 @@ class Appearance:
         """Return each pixel's probability (h, w) to be body, at even odds."""
         return self._posterior(region, self.body_histograms[region.camera.name])
 
-    def limb_posterior(self, region: Region, pair: str) -> Array32:
+    def limb_posterior(self, region: Region, pair: int) -> Array32:
         """Return each pixel's probability (h, w) to be a limb of a pair, or background: by colours, not by places.
 
         Where nothing has been learned of the pair, its probability to be body.
         """
-        own, body = self.limb_histograms.get((region.camera.name, pair)), self.body_histograms[region.camera.name]
-        if own is None:
+        body, pairs = self.body_histograms[region.camera.name], self.limb_histograms.get(region.camera.name)
+        if pairs is None or not (own := pairs[pair]).any():
             return self.posterior(region)
         return self._posterior(region, np.asarray(own + _OTHER_COLOURS * (body - own), np.float32))
 

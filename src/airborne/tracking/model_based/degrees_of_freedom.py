@@ -246,17 +246,13 @@ def limbs_of(model: BodyModel) -> tuple[NDArray[np.int64], ...]:
 
 
 @lru_cache(maxsize=16)
-def limbs_by_pair(model: BodyModel) -> dict[str, NDArray[np.int64]]:
-    """Return the segments of each pair of limbs, by `pair_name`; not to be written to."""
-    pairs: dict[str, list[NDArray[np.int64]]] = {}
+def pair_of_segment(model: BodyModel) -> NDArray[np.int64]:
+    """Return the number of each segment's pair of limbs, arms or legs, -1 for those of none: (segments,)."""
+    pairs, names = np.full(len(model.segments), -1), dict[str, int]()
     for limb in limbs_of(model):
-        pairs.setdefault(pair_name(model, limb), []).append(limb)
-    return {pair: np.concatenate(limbs) for pair, limbs in pairs.items()}
-
-
-def pair_name(model: BodyModel, limb: NDArray[np.int64]) -> str:
-    """Return what a limb and that on the other side are called: as its first segment, without its side."""
-    return without_side(model.segments[limb[0]].name)
+        pairs[limb] = names.setdefault(without_side(model.segments[limb[0]].name), len(names))
+    pairs.flags.writeable = False
+    return pairs
 
 
 def joints_of(model: BodyModel, segments: NDArray[np.integer]) -> DegreesOfFreedom:

@@ -16,7 +16,7 @@ from airborne.tracking.model_based.degrees_of_freedom import (
     PosePrior,
     joints_of,
     limbs_of,
-    pair_name,
+    pair_of_segment,
     proximal_to_distal,
     root_only,
 )
@@ -243,7 +243,12 @@ class Fitter:
         somersaults no second place was better. The prior is returned too, wide for a limb that was moved.
         """
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
-        args = self.render_model, [fit.pose, *expected], limb, learned.limb_evidence(pair_name(self.model, limb))
+        args = (
+            self.render_model,
+            [fit.pose, *expected],
+            limb,
+            learned.limb_evidence(int(pair_of_segment(self.model)[limb[0]])),
+        )
         places = search_limb(*args, shared=fit.equations.shared)
         dofs, masks, coarse = joints_of(self.model, limb), learned.masks, len(NEAR) - 1
         poses = [fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs) for pose in places]

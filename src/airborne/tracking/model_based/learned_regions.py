@@ -13,7 +13,7 @@ from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
 from airborne.rendering import EvidenceMaps
 from airborne.tracking.image_regions import narrow_regions
-from airborne.tracking.model_based.degrees_of_freedom import pair_name
+from airborne.tracking.model_based.degrees_of_freedom import pair_of_segment
 from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.image_views import ImageView, make_image_views
@@ -33,7 +33,7 @@ class LearnedRegions:
     appearance: Appearance
     # images prepared by an appearance: where a limb is looked for, they are fitted again and again
     prepared: dict[Appearance, Sequence[ImageView]] = field(default_factory=dict)
-    _of_limbs: dict[str, Sequence[Array32]] = field(default_factory=dict)  # as `Appearance.limb_posterior`, by pair
+    _of_limbs: dict[int, Sequence[Array32]] = field(default_factory=dict)  # as `Appearance.limb_posterior`, by pair
 
     @classmethod
     def of(cls, regions: Sequence[Region], appearance: Appearance) -> LearnedRegions:
@@ -51,7 +51,7 @@ class LearnedRegions:
         """Each pixel's evidence for the body, for searches."""
         return region_evidence(*self.views)
 
-    def limb_evidence(self, pair: str) -> EvidenceMaps:
+    def limb_evidence(self, pair: int) -> EvidenceMaps:
         """Return each pixel's evidence for a limb of a pair, for its search."""
         return region_evidence(self.masks.regions, self._limb_planes(pair))
 
@@ -63,12 +63,14 @@ class LearnedRegions:
         posed, planes = render_model.with_pose(pose), []
         if limb is None:
             return mask_agreement(render_model, posed, *self.views).evidence
-        for region, plane, own in zip(*self.views, self._limb_planes(pair_name(render_model.model, limb)), strict=True):
+        for region, plane, own in zip(
+            *self.views, self._limb_planes(int(pair_of_segment(render_model.model)[limb[0]])), strict=True
+        ):
             is_limb = render_model.shows_segments(render_model.draw_parts(posed, region), limb)
             planes.append(np.where(is_limb, own, plane))
         return mask_agreement(render_model, posed, self.masks.regions, planes).evidence
 
-    def _limb_planes(self, pair: str) -> Sequence[Array32]:
+    def _limb_planes(self, pair: int) -> Sequence[Array32]:
         if pair not in self._of_limbs:
             self._of_limbs[pair] = [self.appearance.limb_posterior(each, pair) for each in self.masks.regions]
         return self._of_limbs[pair]

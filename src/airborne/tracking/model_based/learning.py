@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from airborne.appearance.model import Appearance, Region
 from airborne.body import Pose, PosedBody
-from airborne.tracking.model_based.degrees_of_freedom import limbs_by_pair
+from airborne.tracking.model_based.degrees_of_freedom import pair_of_segment
 from airborne.tracking.model_based.exposure import Exposure, Extrapolation, bodies_in_exposure
 from airborne.tracking.model_based.render_model import RenderModel
 
@@ -35,9 +35,7 @@ def learn_appearance(
         ever, always = np.logical_or.reduce(masks), np.logical_and.reduce(masks)
         if colours or not appearance.has_colours(region):
             appearance = appearance.learn_colours(region, ever, body=always)
-            for pair, segments in limbs_by_pair(render_model.model).items():
-                own = [_mask(render_model, body, region, segments) for body in bodies]
-                appearance = appearance.learn_limb_colours(region, pair, np.logical_and.reduce(own))
+            appearance = _learn_limbs(render_model, bodies, region, appearance)
         if backgrounds or not appearance.has_background(region):
             appearance = appearance.learn_background(region, ever)
     return appearance
@@ -53,9 +51,16 @@ def learn_missing_backgrounds(
     return appearance
 
 
-def _mask(
-    render_model: RenderModel, posed: PosedBody, region: Region, segments: NDArray[np.integer] | None = None
-) -> NDArray[np.bool_]:
-    """Return where a region shows the body, or some of its segments: (h, w)."""
-    part = render_model.draw_parts(posed, region)
-    return part >= 0 if segments is None else render_model.shows_segments(part, segments)
+def _learn_limbs(
+    render_model: RenderModel, bodies: Sequence[PosedBody], region: Region, appearance: Appearance
+) -> Appearance:
+    """Learn the colours of pairs of limbs where they were all the time."""
+    pair_of_part = np.append(pair_of_segment(render_model.model)[render_model.segment_of_part], -1)
+    part, *others = [render_model.draw_parts(body, region) for body in bodies]
+    for other in others:
+        part = np.where(pair_of_part[part] == pair_of_part[other], part, -1)
+    return appearance.learn_limb_colours(region, part, pair_of_part)
+
+
+def _mask(render_model: RenderModel, posed: PosedBody, region: Region) -> NDArray[np.bool_]:
+    return render_model.draw_parts(posed, region) >= 0
