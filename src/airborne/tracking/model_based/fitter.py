@@ -252,13 +252,13 @@ class Fitter:
         places = search_limb(*args, shared=fit.equations.shared)
         dofs, masks, coarse = joints_of(self.model, limb), learned.masks, len(NEAR) - 1
         poses = [fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs) for pose in places]
-        best = max(poses, key=lambda pose: learned.mask_evidence(self.render_model, pose, limb))
+        best = max(poses, key=lambda pose: self.agreement(pose, learned).evidence)
         best = fit_silhouettes(self.render_model, best, masks, levels=NEAR[coarse:], dofs=dofs)
         if limb_distance(self.model, fit.pose, best, limb) < SAME_M:
             return fit, prior
         widened = None if prior is None else prior.widen(dofs.columns)
         moved = self.fit_images([best], learned, widened)
-        return best_place(self.render_model, [fit, moved], learned, prior=prior, widened=widened, limb=limb)
+        return best_place(self.render_model, [fit, moved], learned, prior=prior, widened=widened)
 
     def _stages_at(self, reduction: int) -> list[DegreesOfFreedom]:
         trunk, everything = self.stages[0], self.stages[-1]

@@ -6,20 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from airborne.appearance.model import Appearance, Region
-from airborne.body import Pose, PosedBody
+from airborne.body import PosedBody
 from airborne.rendering import EvidenceMaps
 from airborne.tracking.image_regions import narrow_regions
-from airborne.tracking.model_based.degrees_of_freedom import pair_of_segment
 from airborne.tracking.model_based.gauss_newton import Posteriors
 from airborne.tracking.model_based.global_search import region_evidence
 from airborne.tracking.model_based.image_views import ImageView, make_image_views
 from airborne.tracking.model_based.learning import learn_missing_backgrounds
 from airborne.tracking.model_based.render_model import RenderModel
-from airborne.tracking.model_based.status import mask_agreement
 from airborne.types import Array32
 
 MARGIN_PX = 12  # of a full frame: the blur's radius, and how far images move a body beyond its silhouettes
@@ -33,7 +28,7 @@ class LearnedRegions:
     appearance: Appearance
     # images prepared by an appearance: where a limb is looked for, they are fitted again and again
     prepared: dict[Appearance, Sequence[ImageView]] = field(default_factory=dict)
-    _of_limbs: dict[int, Sequence[Array32]] = field(default_factory=dict)  # as `Appearance.limb_posterior`, by pair
+    _of_limbs: dict[int, EvidenceMaps] = field(default_factory=dict)  # by pair
 
     @classmethod
     def of(cls, regions: Sequence[Region], appearance: Appearance) -> LearnedRegions:
@@ -52,27 +47,13 @@ class LearnedRegions:
         return region_evidence(*self.views)
 
     def limb_evidence(self, pair: int) -> EvidenceMaps:
-        """Return each pixel's evidence for a limb of a pair, for its search."""
-        return region_evidence(self.masks.regions, self._limb_planes(pair))
+        """Return each pixel's evidence for a limb of a pair, for its search: it has to look like that limb.
 
-    def mask_evidence(self, render_model: RenderModel, pose: Pose, limb: NDArray[np.int64] | None) -> float:
-        """Sum the evidence of a pose's mask [nats]; what one limb covers has to look like it, not like any of the body.
-
-        Else it would cover loose clothes, or flesh, that stand out from the body.
+        By any of the body's colours, an arm would cover loose clothes, or flesh, that stand out from the model.
         """
-        posed, planes = render_model.with_pose(pose), []
-        if limb is None:
-            return mask_agreement(render_model, posed, *self.views).evidence
-        for region, plane, own in zip(
-            *self.views, self._limb_planes(int(pair_of_segment(render_model.model)[limb[0]])), strict=True
-        ):
-            is_limb = render_model.shows_segments(render_model.draw_parts(posed, region), limb)
-            planes.append(np.where(is_limb, own, plane))
-        return mask_agreement(render_model, posed, self.masks.regions, planes).evidence
-
-    def _limb_planes(self, pair: int) -> Sequence[Array32]:
         if pair not in self._of_limbs:
-            self._of_limbs[pair] = [self.appearance.limb_posterior(each, pair) for each in self.masks.regions]
+            planes = [self.appearance.limb_posterior(region, pair) for region in self.masks.regions]
+            self._of_limbs[pair] = region_evidence(self.masks.regions, planes)
         return self._of_limbs[pair]
 
     def make_image_views(

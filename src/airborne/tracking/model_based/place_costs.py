@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airborne.body import BodyModel, Pose
 from airborne.tracking.model_based.degrees_of_freedom import PosePrior
 from airborne.tracking.model_based.gauss_newton import Fit
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.render_model import RenderModel
+from airborne.tracking.model_based.status import mask_agreement
 from airborne.tracking.model_based.turned_pelvis import is_improbable
 
 # what a limb costs that is not where it was expected; of synthetic limbs moved at 7, a third more were wrong
@@ -26,16 +26,12 @@ def best_place(
     prior: PosePrior | None,
     widened: PosePrior | None,
     n_lost: int = 1,
-    limb: NDArray[np.int64] | None = None,
 ) -> tuple[Fit, PosePrior | None]:
-    """Return the first fit, or one that is better with n limbs away from where they were expected, each with its prior.
-
-    `limb`: the only one in which they differ, if it is one.
-    """
+    """Return the first fit, or a better one with n limbs away from where they were expected, each with its prior."""
     misfit, lost = min(each.equations.misfit for each in fits), n_lost * _LOST_NATS
 
     def cost(fit: Fit, prior: PosePrior | None) -> float:
-        return _place_cost(render_model, fit, learned, misfit, prior=prior, limb=limb)
+        return _place_cost(render_model, fit, learned, misfit, prior=prior)
 
     costs = [cost(each, widened) + lost for each in fits]
     stays = min(cost(fits[0], prior), costs[0])
@@ -55,7 +51,6 @@ def _place_cost(
     misfit: float,
     *,
     prior: PosePrior | None,
-    limb: NDArray[np.int64] | None,
 ) -> float:
     """Return minus the log-probability of a fit among others that have a limb elsewhere [nat].
 
@@ -63,5 +58,6 @@ def _place_cost(
     what counts. So the mask's evidence counts too, a patch of pixels as one. A trunk that is twisted to its limits, or
     crossed legs, are as unlikely as a lost limb.
     """
-    of_mask = learned.mask_evidence(render_model, fit.equations.pose, limb) / fit.equations.shared
+    posed = render_model.with_pose(fit.equations.pose)
+    of_mask = mask_agreement(render_model, posed, *learned.views).evidence / fit.equations.shared
     return fit.objective(misfit, prior) - of_mask + improbable_nats(render_model.model, fit.pose)

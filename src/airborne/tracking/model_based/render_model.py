@@ -105,10 +105,6 @@ class RenderModel:
         """Draw which part each pixel of a region shows: (h, w), -1 where none; not to be written to."""
         return _draw_parts(self, posed, region)
 
-    def shows_segments(self, part: NDArray[np.int16], segments: NDArray[np.integer]) -> NDArray[np.bool_]:
-        """Return which pixels show some segments, given the part that each shows: (h, w)."""
-        return np.append(np.isin(self.segment_of_part, segments), False)[part]
-
 
 @lru_cache(maxsize=8)  # a fit is judged in one pose several times, and each time it is drawn in all views
 def _pose_body(model: BodyModel, pose: Pose) -> PosedBody:
