@@ -15,6 +15,7 @@ from airborne.tracking.model_based.fitter import Fitter, JudgedFit
 from airborne.tracking.model_based.gauss_newton import CLOSE, CLOSE_JOINTED, NEAR
 from airborne.tracking.model_based.learned_regions import LearnedRegions
 from airborne.tracking.model_based.left_right_swap import is_nearer
+from airborne.tracking.model_based.render_model import RenderModel
 from airborne.tracking.model_based.status import Reference
 from airborne.video import Frames
 
@@ -56,7 +57,7 @@ def fit_next(
     levels = CLOSE_JOINTED if fitter.moves_joints else CLOSE
     levels = NEAR if agreement.is_suspect(reference) else levels
     starts = [fitter.fit_silhouettes(expected, learned, levels, prior)]
-    if not fitter.moves_joints and not is_same(starts[0], expected):
+    if not fitter.moves_joints and _is_elsewhere(fitter.render_model, starts[0], expected):
         starts.append(expected)  # silhouettes do not tell colours apart: a round thing turns under them
     fit = fitter.fit_images(starts, learned, prior)
     swaps = [pose for pose in fitter.swap_limbs(fit.pose) if is_nearer(fitter.model, pose, fit.pose, expected)]
@@ -70,3 +71,10 @@ def is_same(pose: Pose, other: Pose) -> bool:
     delta = delta_between(pose, other)
     rotations = np.linalg.norm(delta[3:].reshape(-1, 3), axis=1)
     return bool(np.linalg.norm(delta[:3]) < _SAME_M and np.all(rotations < _SAME_RAD))
+
+
+def _is_elsewhere(render_model: RenderModel, pose: Pose, other: Pose) -> bool:
+    """Whether the roots of two poses differ by more than those of `is_same`; these are posed for fits anyhow."""
+    (R, t), (R_other, t_other) = ((body.R[0], body.t[0]) for body in map(render_model.with_pose, (pose, other)))
+    cosine = (np.sum(R * R_other) - 1) / 2
+    return bool(cosine < np.cos(_SAME_RAD) or np.linalg.norm(t - t_other) > _SAME_M)

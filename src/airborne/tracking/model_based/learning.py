@@ -35,7 +35,8 @@ def learn_appearance(
         ever, always = np.logical_or.reduce(masks), np.logical_and.reduce(masks)
         if colours or not appearance.has_colours(region):
             appearance = appearance.learn_colours(region, ever, body=always)
-            appearance = _learn_limbs(render_model, bodies, region, appearance)
+            if render_model.model.has_joints:
+                appearance = _learn_limbs(render_model, bodies, region, appearance)
         if backgrounds or not appearance.has_background(region):
             appearance = appearance.learn_background(region, ever)
     return appearance
