@@ -20,9 +20,8 @@ _SAME_COLOUR = 1.0  # grey levels
 # third of a pixel of a ball at 160 pixels a metre
 _OUT_OF_ROUND = 0.02
 _MOST_FACES = 20_000  # of a mesh whose faces are looked at within, chosen: finer ones at their centres alone
-_INSIDE = (
-    np.array([(i, j, 14 - i - j) for i in range(1, 14, 3) for j in range(1, 14 - i, 3)]) + 1 / 3
-) / 15  # of a face
+_BARYCENTRIC = [(i, j, 14 - i - j) for i in range(1, 14, 3) for j in range(1, 14 - i, 3)]
+_INSIDE = (np.array(_BARYCENTRIC) + 1 / 3) / 15  # (points, 3) weights of a face's corners, where it is looked at
 _ANGLES_RAD, _MOST_SAMPLES = (0.7, 1.9, 3.3), 0.99  # chosen: no fractions of a turn; of the samples, edges left out
 
 

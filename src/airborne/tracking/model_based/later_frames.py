@@ -74,7 +74,7 @@ def is_same(pose: Pose, other: Pose) -> bool:
 
 
 def _is_elsewhere(render_model: RenderModel, pose: Pose, other: Pose) -> bool:
-    """Whether the roots of two poses differ by more than those of `is_same`; these are posed for fits anyhow."""
+    """Whether a thing has moved between two poses by more than `is_same` allows; both are posed for fits anyhow."""
     (R, t), (R_other, t_other) = ((body.R[0], body.t[0]) for body in map(render_model.with_pose, (pose, other)))
     cosine = (np.sum(R * R_other) - 1) / 2
     return bool(cosine < np.cos(_SAME_RAD) or np.linalg.norm(t - t_other) > _SAME_M)

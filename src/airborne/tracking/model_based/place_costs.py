@@ -45,12 +45,7 @@ def improbable_nats(model: BodyModel, pose: Pose) -> float:
 
 
 def _place_cost(
-    render_model: RenderModel,
-    fit: Fit,
-    learned: LearnedRegions,
-    misfit: float,
-    *,
-    prior: PosePrior | None,
+    render_model: RenderModel, fit: Fit, learned: LearnedRegions, misfit: float, *, prior: PosePrior | None
 ) -> float:
     """Return minus the log-probability of a fit among others that have a limb elsewhere [nat].
 
