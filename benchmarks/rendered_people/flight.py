@@ -9,8 +9,8 @@ from body import Body, joints_of, pose_of, skin_of
 from people import Keys, Person
 from rotations import rotation_of
 
-RATE_HZ = 60
-_GRAVITY_M_S2 = 9.81
+RATE_HZ = 60  # chosen: as of the recorded somersaults
+_GRAVITY_M_S2 = 9.81  # of the Earth
 _STEPS = 10  # of the orientation, per frame; chosen: three times as many turn twisters as much as 2 cm further
 _HALF_STEP_S = 1e-3  # chosen: of the central difference that gives velocities
 _OWN_INERTIA_KG_M2 = 0.4  # chosen: of the segments' thickness, which masses on their axes lack

@@ -45,22 +45,24 @@ def test_colours_that_are_not_known_yet_say_nothing():
     assert find_wrong_colours(replace(HUMAN, segments=(first, *HUMAN.segments[1:])), run_of(), FRAMES) == []
 
 
-def test_a_thing_with_the_colours_of_another_is_named():
+def thrown_cross():
     scene = Scene()
     frames = [scene.frames(index) for index in (0, 4)]
     posed = {"status": Status.TRACKED, "covariance": np.eye(6) * 1e-5, "score": 5.0, "n_views": 4}
     seen = [Estimate(index=f.index, time_s=f.time_s, pose=scene.start(f.index), **posed) for f in frames]
+    return Motion.collect(seen), frames
+
+
+def test_a_thing_with_the_colours_of_another_is_named():
+    motion, frames = thrown_cross()
     own = np.array([part.colour for part in CROSS.parts])
-    assert find_wrong_colours(CROSS, Motion.collect(seen), frames) == []
-    (sentence,) = find_wrong_colours(CROSS.with_colours(own[:, ::-1]), Motion.collect(seen), frames)
+    assert find_wrong_colours(CROSS, motion, frames) == []
+    (sentence,) = find_wrong_colours(CROSS.with_colours(own[:, ::-1]), motion, frames)
     assert "red and blue exchanged" in sentence and "fit-body" not in sentence
 
 
 def test_a_part_in_the_shade_is_not_taken_for_another_colour():
-    scene = Scene()
-    frames = [scene.frames(index) for index in (0, 4)]
-    posed = {"status": Status.TRACKED, "covariance": np.eye(6) * 1e-5, "score": 5.0, "n_views": 4}
-    seen = [Estimate(index=f.index, time_s=f.time_s, pose=scene.start(f.index), **posed) for f in frames]
+    motion, frames = thrown_cross()
     own = np.array([part.colour for part in CROSS.parts])
     lit = own * np.array([[0.6], [1.15], [1.15]])
-    assert find_wrong_colours(CROSS.with_colours(np.clip(lit, 0, 255)), Motion.collect(seen), frames) == []
+    assert find_wrong_colours(CROSS.with_colours(np.clip(lit, 0, 255)), motion, frames) == []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -33,6 +33,10 @@ class _Solid:
     points: Array  # (p, 3) corners, or vertices and face centres, or an ellipsoid's centre and ends of its slab [m]
     moment: Array  # (3, 3) an ellipsoid's axes as a sum of squares [m^2]; zero for other shapes
     colour: Array | None
+
+    @property
+    def is_ellipsoid(self) -> bool:
+        return bool(self.moment.any())
 
     def rotate(self, R: Array) -> _Solid:
         return _Solid(self.index, self.points @ R.T, R @ self.moment @ R.T, self.colour)
@@ -82,21 +86,13 @@ def continuous_axes(model: BodyModel) -> Array:
     None for most bodies, one for spheroids, spheres and turned meshes lined up, and all three where every axis is one
     (a ball). A mesh may be a little out of round, as circles of 16 sides are.
     """
-    solids, shapes = _solids(model), [part.shape for part in model.parts]
-    exact = _axes_of_ellipsoids(
-        [each for each, shape in zip(solids, shapes, strict=True) if isinstance(shape, Ellipsoid)]
-    )
-    if exact is None or any(isinstance(shape, Box) for shape in shapes):
+    placed = list(_place_parts(model))
+    if any(isinstance(part.shape, Box) for part, _, _ in placed):
         return np.zeros((0, 3))
-    posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
-    meshes = [
-        _sample_mesh(
-            part.shape, R @ part.segment_from_part.rotation.as_matrix(), R @ part.segment_from_part.translation + t
-        )
-        for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True)
-        for part in segment.parts
-        if isinstance(part.shape, Mesh)
-    ]
+    exact = _axes_of_ellipsoids([each for each in _solids(model) if each.is_ellipsoid])
+    if exact is None:
+        return np.zeros((0, 3))
+    meshes = [_sample_mesh(part.shape, R, t) for part, R, t in placed if isinstance(part.shape, Mesh)]
     if not meshes:
         return exact
     candidates = exact if len(exact) == 1 else _principal_axes(np.concatenate(meshes))
@@ -160,17 +156,22 @@ def _is_round(samples: Array, axis: Array) -> bool:
     return True
 
 
-def _solids(model: BodyModel) -> list[_Solid]:
+def _place_parts(model: BodyModel) -> Iterator[tuple[Part, Array, Array]]:
+    """Yield each part with its rotation (3, 3) and place (3,) [m] in the root's frame, joints straight."""
     posed = model.with_pose(Pose(world_from_root=RigidTransform.identity()))
-    solids: list[_Solid] = []
     for segment, R, t in zip(model.segments, posed.R, posed.t, strict=True):
         for part in segment.parts:
-            rotation = R @ part.segment_from_part.rotation.as_matrix()
-            centre = R @ part.segment_from_part.translation + t
-            moment = np.zeros((3, 3))
-            if isinstance(part.shape, Ellipsoid):
-                moment = rotation @ np.diag(np.square(part.shape.semi_axes_m)) @ rotation.T
-            solids.append(_Solid(len(solids), _points(part) @ rotation.T + centre, moment, part.colour))
+            place = part.segment_from_part
+            yield part, R @ place.rotation.as_matrix(), R @ place.translation + t
+
+
+def _solids(model: BodyModel) -> list[_Solid]:
+    solids: list[_Solid] = []
+    for part, rotation, centre in _place_parts(model):
+        moment = np.zeros((3, 3))
+        if isinstance(part.shape, Ellipsoid):
+            moment = rotation @ np.diag(np.square(part.shape.semi_axes_m)) @ rotation.T
+        solids.append(_Solid(len(solids), _points(part) @ rotation.T + centre, moment, part.colour))
     return solids
 
 

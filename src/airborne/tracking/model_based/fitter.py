@@ -243,13 +243,8 @@ class Fitter:
         somersaults no second place was better. The prior is returned too, wide for a limb that was moved.
         """
         expected = [replace(fit.pose, joint_angles=with_limb(fit.pose, guess, limb)) for guess in guesses]
-        args = (
-            self.render_model,
-            [fit.pose, *expected],
-            limb,
-            learned.limb_evidence(int(pair_of_segment(self.model)[limb[0]])),
-        )
-        places = search_limb(*args, shared=fit.equations.shared)
+        maps = learned.limb_evidence(int(pair_of_segment(self.model)[limb[0]]))
+        places = search_limb(self.render_model, [fit.pose, *expected], limb, maps, shared=fit.equations.shared)
         dofs, masks, coarse = joints_of(self.model, limb), learned.masks, len(NEAR) - 1
         poses = [fit_silhouettes(self.render_model, pose, masks, levels=NEAR[:coarse], dofs=dofs) for pose in places]
         best = max(poses, key=lambda pose: self.agreement(pose, learned).evidence)
